@@ -1,5 +1,7 @@
 //! Conditions of a scene on the sites of its model: which sites are held, and what force each takes.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use std::collections::BTreeMap;
 
 use crate::coupling::{CellRole, Model, SiteKind};
@@ -9,6 +11,7 @@ use crate::mesh::{Facet, facet_corners};
 use crate::observe::summary::Applied;
 use crate::run::error::RunError;
 use crate::scene::conditions::{Components, Condition, Prescribed, Support};
+use crate::scene::load::Domain;
 use crate::scene::region::Region;
 use crate::tensor::Vector;
 use crate::{
@@ -163,7 +166,10 @@ pub(crate) fn displacement<const D: usize>(
     let x = &model.sites[dof / D].position;
     match &holder.prescribed {
         Prescribed::Field(field) => field.at(x).map_or(0.0, |u| u[dof % D]),
-        _ => holder.components.at_time(dof % D, x, t).unwrap_or(0.0),
+        Prescribed::Displacement(_)
+        | Prescribed::Velocity(_)
+        | Prescribed::Load(_)
+        | Prescribed::Spring(_) => holder.components.at_time(dof % D, x, t).unwrap_or(0.0),
     }
 }
 
@@ -266,18 +272,21 @@ impl<'a, const D: usize> Loads<'a, D> {
             targets: Vec::new(),
         };
         for (number, condition) in conditions.iter().enumerate() {
+            let Some(load) = condition.load() else {
+                continue;
+            };
             let detail = match condition.varies_in_space() {
                 true => Detail::Quadrature,
                 false => Detail::Centre,
             };
             let mut pressed = Vec::new();
-            let (facets, cells, parts) = match &condition.prescribed {
-                Prescribed::Traction(facets) => {
+            let (facets, cells, parts) = match &load.on {
+                Domain::Facets(facets) => {
                     let (own, zone) = split_facets(model, facets);
                     let parts = Parts::of_facets(model, &zone, detail);
                     (own, Vec::new(), parts)
                 }
-                Prescribed::Pressure(facets) => {
+                Domain::Surface(facets) => {
                     // with the nodes that its cell has in the model: cells at the seam are linear
                     let present = facets.iter().map(|f| model.mesh.facet((f.cell, f.local)));
                     let (own, zone): (Vec<_>, Vec<_>) =
@@ -286,7 +295,7 @@ impl<'a, const D: usize> Loads<'a, D> {
                     let parts = Parts::of_facets(model, &zone, detail);
                     (Vec::new(), Vec::new(), parts)
                 }
-                Prescribed::BodyForce(region) => {
+                Domain::Cells(region) => {
                     let inside = cells_of(model, region);
                     let own = (0..inside.len()).filter(|&c| inside[c] && model.is_element(c));
                     let own = own.collect();
@@ -299,7 +308,6 @@ impl<'a, const D: usize> Loads<'a, D> {
                     };
                     (Vec::new(), own, parts)
                 }
-                _ => continue,
             };
             let target = LoadTarget {
                 condition: number,

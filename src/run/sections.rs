@@ -17,7 +17,8 @@ use crate::observe::summary::SectionForce;
 use crate::run::error::RunError;
 use crate::run::loads::{cells_of, holders};
 use crate::run::setup::RunSettings;
-use crate::scene::conditions::{Condition, Prescribed, Support};
+use crate::scene::conditions::{Condition, Support};
+use crate::scene::load::Domain;
 use crate::scene::section::Section;
 use crate::tensor::{Vector, padded};
 
@@ -365,19 +366,22 @@ fn points_beyond<const D: usize>(
         }
     };
     let none = Vector::zeros();
-    match &condition.prescribed {
-        Prescribed::Traction(facets) => {
+    let Some(load) = condition.load() else {
+        return points;
+    };
+    match &load.on {
+        Domain::Facets(facets) => {
             for facet in mesh.present_facets(facets.clone()) {
                 beyond.facet_points(mesh, &facet, |x, w| add(x, w, &none));
             }
         }
-        Prescribed::Pressure(facets) => {
+        Domain::Surface(facets) => {
             for facet in facets {
                 let facet = mesh.facet((facet.cell, facet.local));
                 beyond.outward_points(mesh, &facet, |x, w, n| add(x, w, n));
             }
         }
-        Prescribed::BodyForce(region) => {
+        Domain::Cells(region) => {
             let inside = cells_of(model, region);
             let voids = model.peridynamics.as_ref().map_or(&[][..], |p| &p.voids);
             for c in (0..inside.len()).filter(|&c| inside[c]) {
@@ -390,7 +394,6 @@ fn points_beyond<const D: usize>(
                 });
             }
         }
-        _ => {}
     }
     points
 }

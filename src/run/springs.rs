@@ -11,7 +11,7 @@ use crate::fem;
 use crate::observe::summary::Reaction;
 use crate::run::error::RunError;
 use crate::run::loads::{cells_of, split_facets};
-use crate::scene::conditions::{Bedding, Condition, Prescribed};
+use crate::scene::conditions::{Bedding, Condition};
 use crate::system::SpringRows;
 use crate::tensor::{Tensor, Vector};
 
@@ -36,7 +36,7 @@ impl Springs {
         let mut springs = Self::default();
         let mut all = Blocks::default();
         for condition in conditions {
-            let Prescribed::Spring(bedding) = &condition.prescribed else {
+            let Some(bedding) = condition.springs() else {
                 continue;
             };
             let own = blocks(model, bedding);

@@ -1,17 +1,11 @@
-//! The conditions of a scene, each made of what it types, and all of them together.
+//! All conditions of a scene together.
 
 use std::collections::BTreeMap;
 
-use super::conditions::{
-    Components, Condition, Prescribed, Support, components, facet_set, finite, inside, support,
-};
-use super::error::{SceneError, SceneErrorKind};
-use super::expression::Expression;
-use super::region::Region;
+use super::condition_kinds::ConditionSpec;
+use super::conditions::{Condition, Prescribed, Support};
+use super::error::{SceneError, SceneErrorKind, Span};
 use super::solve::{Clock, Pacing};
-use super::source::Span;
-use super::spec::{ConditionSpec, DisplacementSpec, ShapeSpec, VelocitySpec};
-use super::surface_conditions;
 use super::value::Text;
 use crate::mesh::Mesh;
 use crate::tensor::Vector;
@@ -24,7 +18,7 @@ pub(crate) fn conditions<const D: usize>(
 ) -> Result<Vec<Condition<D>>, SceneError> {
     let mut found = Vec::with_capacity(spec.len());
     for (name, condition) in spec {
-        found.push(one(name, condition, mesh, clock)?);
+        found.push(condition.build(name, mesh, clock)?);
     }
     let holds = |c: &Condition<D>| {
         matches!(
@@ -42,152 +36,6 @@ pub(crate) fn conditions<const D: usize>(
     }
     agree(spec, &found, mesh, clock)?;
     Ok(found)
-}
-
-/// Components of a condition as a scene types them.
-struct Typed<'a> {
-    name: &'a Text,
-    place: String,
-    given: [&'a Option<Expression>; 3],
-}
-
-impl Typed<'_> {
-    /// The components, checked.
-    fn components<const D: usize>(&self, clock: Clock) -> Result<Components<D>, SceneError> {
-        let components = components::<D>(&self.place, self.name, self.given)?;
-        for (axis, e) in ["x", "y", "z"].iter().zip(&components.0) {
-            if let Some(e) = e {
-                clock.admits(&format!("{}.{axis}", self.place), e)?;
-            }
-        }
-        Ok(components)
-    }
-
-    fn condition<const D: usize>(
-        &self,
-        prescribed: Prescribed<D>,
-        components: Components<D>,
-    ) -> Condition<D> {
-        Condition {
-            name: self.name.value.clone(),
-            prescribed,
-            components,
-        }
-    }
-}
-
-/// A condition: what is prescribed, where, and by which components.
-fn one<const D: usize>(
-    name: &Text,
-    spec: &ConditionSpec,
-    mesh: &Mesh<D>,
-    clock: Clock,
-) -> Result<Condition<D>, SceneError> {
-    let typed = |kind: &str, given| Typed {
-        name,
-        place: format!("conditions.{name}.{kind}"),
-        given,
-    };
-    match spec {
-        ConditionSpec::Displacement(DisplacementSpec {
-            on,
-            inside,
-            x,
-            y,
-            z,
-        }) => {
-            let typed = typed("displacement", [x, y, z]);
-            let (support, components) = held(&typed, on.as_ref(), inside.as_ref(), mesh, clock)?;
-            Ok(typed.condition(Prescribed::Displacement(support), components))
-        }
-        ConditionSpec::Velocity(VelocitySpec {
-            on,
-            inside,
-            x,
-            y,
-            z,
-        }) => {
-            let typed = typed("velocity", [x, y, z]);
-            moves(&typed.place, name, &typed.components::<D>(clock)?, clock)?;
-            let (support, components) = held(&typed, on.as_ref(), inside.as_ref(), mesh, clock)?;
-            Ok(typed.condition(Prescribed::Velocity(support), components))
-        }
-        ConditionSpec::Traction(c) => {
-            let typed = typed("traction", [&c.x, &c.y, &c.z]);
-            let components = typed.components(clock)?;
-            let facets = facet_set(&typed.place, &c.on, mesh)?;
-            // else a line through cells would carry a load
-            surface_conditions::faces(&typed.place, &c.on, mesh)?;
-            let nodes = facets.iter().flatten().map(|&n| mesh.nodes[n as usize]);
-            finite(&typed.place, name, &components, clock, nodes)?;
-            Ok(typed.condition(Prescribed::Traction(facets.to_vec()), components))
-        }
-        ConditionSpec::BodyForce(c) => {
-            let typed = typed("body-force", [&c.x, &c.y, &c.z]);
-            let components = typed.components(clock)?;
-            let region = match &c.inside {
-                Some(shape) => inside(&typed.place, name, shape, mesh)?,
-                None => Region::everywhere(),
-            };
-            let within = (0..mesh.cell_count())
-                .map(|i| mesh.centroid(i))
-                .filter(|x| region.contains(x, 0.0));
-            finite(&typed.place, name, &components, clock, within)?;
-            Ok(typed.condition(Prescribed::BodyForce(region), components))
-        }
-        ConditionSpec::Pressure(c) => surface_conditions::pressure(name, c, mesh, clock),
-        ConditionSpec::Spring(c) => surface_conditions::spring(name, c, mesh),
-        ConditionSpec::Symmetry(c) => surface_conditions::symmetry(name, c, mesh),
-        ConditionSpec::Rotation(c) => surface_conditions::rotation(name, c, mesh, clock),
-    }
-}
-
-/// Where a motion is prescribed, and its components, which are numbers there.
-fn held<const D: usize>(
-    typed: &Typed<'_>,
-    on: Option<&Text>,
-    inside: Option<&ShapeSpec>,
-    mesh: &Mesh<D>,
-    clock: Clock,
-) -> Result<(Support<D>, Components<D>), SceneError> {
-    let components = typed.components(clock)?;
-    let support = support(&typed.place, typed.name, on, inside, mesh)?;
-    if let Support::Set { nodes, .. } = &support {
-        let nodes = nodes.iter().map(|&n| mesh.nodes[n as usize]);
-        finite(&typed.place, typed.name, &components, clock, nodes)?;
-    }
-    Ok((support, components))
-}
-
-/// Checks that a velocity is one that a run can follow.
-fn moves<const D: usize>(
-    place: &str,
-    name: &Text,
-    components: &Components<D>,
-    clock: Clock,
-) -> Result<(), SceneError> {
-    if clock.pacing != Pacing::Moving {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`{place}` in a scene that does not move"),
-        )
-        .label(name.span.clone(), "a velocity")
-        .help("add [solve.explicit] with duration = ..., or prescribe a displacement"));
-    }
-    match components
-        .0
-        .iter()
-        .flatten()
-        .find(|e| e.depends_on_time() && e.depends_on_position())
-    {
-        None => Ok(()),
-        Some(e) => Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`{place}` depends on time and on position"),
-        )
-        .label(e.span.clone(), "has no displacement in closed form")
-        .help("prescribe the displacement, its integral over t; or let the velocity depend on one of the two")),
-    }
 }
 
 /// Refuses two motions of one node that differ.

@@ -1,7 +1,7 @@
 //! Voids and cracks of a scene.
 
-use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
+use super::places::extent;
 use super::region;
 use super::spec::{SceneSpec, ShapeSpec, VoidSpec};
 use super::value::Text;

@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use super::source::{Source, Span};
+/// A range of bytes of the text of a scene, its overrides after it.
+pub type Span = std::ops::Range<usize>;
 
 /// What sort of mistake a [`SceneError`] reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -84,26 +85,14 @@ impl SceneError {
         self
     }
 
-    /// Attaches the text that the labels point into.
-    pub fn shown_in(mut self, source: &Source) -> Self {
-        let spans: Vec<Span> = self.labels.iter().map(|(s, _)| s.clone()).collect();
-        let (name, text, local, line) = source.locate(&spans);
-        let labels = local
-            .into_iter()
-            .zip(&self.labels)
-            .filter_map(|(span, (_, words))| span.map(|s| (s, words.clone())))
-            .collect();
-        let place = source.place_of(&spans);
-        let line = match (&place, spans.is_empty()) {
-            (None, false) => line,
-            _ => 0,
-        };
-        self.shown = Some(Box::new(Excerpt {
-            name: place.unwrap_or(name),
-            text,
-            labels,
-            line,
-        }));
+    /// Places, with the words under them.
+    pub(super) fn labels(&self) -> &[(Span, String)] {
+        &self.labels
+    }
+
+    /// The mistake with what is shown of the scene.
+    pub(super) fn shown(mut self, excerpt: Excerpt) -> Self {
+        self.shown = Some(Box::new(excerpt));
         self
     }
 
@@ -156,6 +145,15 @@ impl fmt::Display for SceneError {
 }
 
 impl std::error::Error for SceneError {}
+
+/// `` `a`, `b`, `c` ``.
+pub(crate) fn quoted(names: &[&str]) -> String {
+    names
+        .iter()
+        .map(|n| format!("`{n}`"))
+        .collect::<Vec<_>>()
+        .join(", ")
+}
 
 /// The member of `known` that `word` was probably meant to be.
 pub(crate) fn closest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {

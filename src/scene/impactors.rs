@@ -1,14 +1,13 @@
 //! Rigid impactors of a validated scene.
 
 use super::bounds_checks;
-use super::conditions::Components;
-use super::error::{SceneError, SceneErrorKind};
+use super::components::Components;
+use super::error::{SceneError, SceneErrorKind, quoted};
 use super::expression::Expression;
 use super::region::position;
 use super::solve::{Clock, Solve};
 use super::source::Span;
 use super::spec::{ImpactorMotionSpec, ImpactorSpec, SceneSpec};
-use super::tagged_table::quoted;
 use super::value::{Coordinates, Text};
 use crate::coupling::ImpactorShape;
 use crate::tensor::Vector;

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::conditions::{Components, components, finite, inside};
+use super::components::{Components, components, finite};
 use super::error::{SceneError, SceneErrorKind};
+use super::places::inside;
 use super::region::Region;
 use super::solve::{Clock, Pacing, still};
 use super::spec::{InitialFieldSpec, InitialSpec, ShapeSpec};

@@ -1,9 +1,9 @@
 //! Parts of the nonlocal zone with a horizon and a lattice of their own, and the layers of elements between them.
 
 use super::bounds_checks;
-use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
 use super::peridynamics::Peridynamics;
+use super::places::extent;
 use super::region;
 use super::spec::{BodySpec, CouplingTraits, LatticeStart, SceneSpec};
 use super::value::Text;

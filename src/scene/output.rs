@@ -3,8 +3,8 @@
 use toml::Spanned;
 
 use super::bounds_checks;
-use super::conditions::extent;
 use super::error::{SceneError, SceneErrorKind};
+use super::places::extent;
 use super::region::{self, Region};
 use super::section;
 use super::spec::{OutputSpec, SceneSpec, SolveSpec, TipSpec};

@@ -4,7 +4,7 @@ use serde::Deserialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
-use super::error::{SceneError, SceneErrorKind};
+use super::error::{SceneError, SceneErrorKind, quoted};
 use super::function;
 use super::source::{Place, Source, find};
 use super::spec::{MeshSpec, SceneSpec};
@@ -133,10 +133,7 @@ fn translate(error: &toml::de::Error, places: &DeTable<'_>) -> SceneError {
         )
         .label(span, "a table of one key belongs here")
         .help(match tagged_table::options(&path) {
-            Some(options) => format!(
-                "write {{ key = ... }} with one of {}",
-                tagged_table::quoted(options)
-            ),
+            Some(options) => format!("write {{ key = ... }} with one of {}", quoted(options)),
             None => "see `bondline schema` for the choices".to_owned(),
         });
     }

@@ -1,9 +1,8 @@
 //! Shapes and regions of a validated scene.
 
-use super::error::{SceneError, SceneErrorKind};
+use super::error::{SceneError, SceneErrorKind, quoted};
 use super::source::Span;
 use super::spec::{BoxSpec, NearSpec, SegmentSpec, ShapeSpec};
-use super::tagged_table;
 use super::value::{Coordinates, Text};
 use crate::mesh::Mesh;
 use crate::shape::Shape;
@@ -256,7 +255,7 @@ fn near<const D: usize>(place: &str, n: &NearSpec) -> Result<Region<D>, SceneErr
             SceneErrorKind::Choice,
             match names.as_slice() {
                 [] => format!("`{place}` names no shape"),
-                _ => format!("`{place}` names {} at once", tagged_table::quoted(&names)),
+                _ => format!("`{place}` names {} at once", quoted(&names)),
             },
         )
         .label(n.within.span.clone(), "within what?")
@@ -352,7 +351,7 @@ pub(crate) fn unknown_set<const D: usize>(
     let list = if known.is_empty() {
         format!("the mesh has no {wanted}; name one in Gmsh as a physical group")
     } else {
-        format!("it has the {wanted} {}", tagged_table::quoted(known))
+        format!("it has the {wanted} {}", quoted(known))
     };
     SceneError::new(SceneErrorKind::UnknownSet, message)
         .label(name.span.clone(), format!("no {wanted}"))

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::conditions::{extent, inside};
 use super::error::{SceneError, SceneErrorKind};
+use super::places::{extent, inside};
 use super::region::{Region, position};
 use super::spec::SectionSpec;
 use super::value::Text;

@@ -9,15 +9,38 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{SceneError, SceneErrorKind};
+use super::error::{Excerpt, SceneError, SceneErrorKind};
 use super::function::Function;
 use super::tagged_table;
 use crate::mesh::MeshParts;
 use crate::observe::checkpoint::Fingerprint;
 use crate::regular_file;
 
-/// A range of bytes of a [`Source`].
-pub type Span = std::ops::Range<usize>;
+pub use super::error::Span;
+
+impl SceneError {
+    /// Attaches the text that the labels point into.
+    pub fn shown_in(self, source: &Source) -> Self {
+        let spans: Vec<Span> = self.labels().iter().map(|(s, _)| s.clone()).collect();
+        let (name, text, local, line) = source.locate(&spans);
+        let labels = local
+            .into_iter()
+            .zip(self.labels())
+            .filter_map(|(span, (_, words))| span.map(|s| (s, words.clone())))
+            .collect();
+        let place = source.place_of(&spans);
+        let line = match (&place, spans.is_empty()) {
+            (None, false) => line,
+            _ => 0,
+        };
+        self.shown(Excerpt {
+            name: place.unwrap_or(name),
+            text,
+            labels,
+            line,
+        })
+    }
+}
 
 /// The text of a scene file and of the overrides typed after it.
 #[derive(Clone, Debug)]

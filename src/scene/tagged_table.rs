@@ -6,9 +6,10 @@
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{SceneError, SceneErrorKind, closest};
+use super::error::{SceneError, SceneErrorKind, closest, quoted};
 use std::sync::LazyLock;
 
+use super::condition_kinds::ConditionSpec;
 use super::spec::CouplingSpec;
 use crate::peridynamics::laws::Named;
 
@@ -68,16 +69,6 @@ static MATERIALS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
 });
 const AXES: &[&str] = &["cells", "graded", "spacing"];
 const MESHES: &[&str] = &["box", "file", "line", "rectangle"];
-const CONDITIONS: &[&str] = &[
-    "body-force",
-    "displacement",
-    "pressure",
-    "rotation",
-    "spring",
-    "symmetry",
-    "traction",
-    "velocity",
-];
 const SOLVES: &[&str] = &["explicit", "quasi-static", "static"];
 const INITIAL: &[&str] = &["displacement", "velocity"];
 const POINTS: &[&str] = &["cells", "lattice"];
@@ -100,7 +91,7 @@ pub(crate) fn options(path: &[&str]) -> Option<&'static [&'static str]> {
         ["materials", _] => Some(&MATERIALS),
         ["materials", _, _, "micromodulus"] => Some(MICROMODULI),
         ["peridynamics", "points"] => Some(POINTS),
-        ["conditions", _] => Some(CONDITIONS),
+        ["conditions", _] => Some(ConditionSpec::KEYS),
         ["zones", "transition"] => Some(TRANSITIONS),
         ["zones", "nonlocal"]
         | ["conditions" | "initial", _, _, "inside"]
@@ -296,15 +287,6 @@ pub(crate) fn unknown(word: &str, place: &str, known: &[&str]) -> SceneError {
     .help(help)
 }
 
-/// `` `a`, `b`, `c` ``.
-pub(crate) fn quoted(names: &[&str]) -> String {
-    names
-        .iter()
-        .map(|n| format!("`{n}`"))
-        .collect::<Vec<_>>()
-        .join(", ")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -322,7 +304,7 @@ mod tests {
         };
         let lists: [(&str, &[&str]); 8] = [
             ("AxisSpec", AXES),
-            ("ConditionSpec", CONDITIONS),
+            ("ConditionSpec", ConditionSpec::KEYS),
             ("InitialSpec", INITIAL),
             ("MaterialSpec", &MATERIALS),
             ("MeshSpec", MESHES),

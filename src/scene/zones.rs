@@ -1,9 +1,9 @@
 //! The model of each cell: local, transition or nonlocal.
 
 use super::bounds_checks;
-use super::conditions::extent;
 use super::default_horizon::horizon_of;
 use super::error::{SceneError, SceneErrorKind};
+use super::places::extent;
 use super::region::{self, Region};
 use super::source::Span;
 use super::spec::{CouplingSpec, SceneSpec, ShapeSpec, SkinSpec, TransitionSpec, ZonesNeeded};

@@ -4,7 +4,6 @@ use super::RunOptions;
 use crate::coupling::Problem;
 use crate::peridynamics::bond_force::BondKinematics;
 use crate::run::setup::RunSettings;
-use crate::scene::conditions::Prescribed;
 use crate::scene::solve::Explicit;
 use crate::scene::spec::{ElementsSpec, PrecisionSpec};
 use crate::system::{Ranks, all_say};
@@ -65,7 +64,7 @@ pub(crate) fn moves_own_sites<const D: usize>(spec: &Explicit, rest: &RunSetting
     let mut conditions = rest.conditions.iter();
     spec.sub_steps.is_none()
         && rest.impactors.is_empty()
-        && conditions.all(|c| !matches!(c.prescribed, Prescribed::Spring(_)))
+        && conditions.all(|c| c.springs().is_none())
 }
 
 /// Collective: what the processes of a run share; no more than any of them can, and nothing where somebody looks at each step.

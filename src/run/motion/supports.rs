@@ -39,11 +39,14 @@ impl<const D: usize> Supports<D> {
             name: c.name.clone(),
             prescribes: std::array::from_fn(|k| match c.prescribed {
                 Prescribed::Field(_) => true,
-                _ => c.components.0[k].is_some(),
+                Prescribed::Displacement(_)
+                | Prescribed::Velocity(_)
+                | Prescribed::Load(_)
+                | Prescribed::Spring(_) => c.components.0[k].is_some(),
             }),
         };
         let springs = conditions.iter();
-        let springs = springs.filter(|c| matches!(c.prescribed, Prescribed::Spring(_)));
+        let springs = springs.filter(|c| c.springs().is_some());
         Self {
             spring_names: springs.map(|c| c.name.clone()).collect(),
             springs: None,

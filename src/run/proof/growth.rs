@@ -61,10 +61,7 @@ pub(crate) fn free_start<'a, const D: usize>(
     let is_still = |c: &Condition<D>| match &c.prescribed {
         Prescribed::Displacement(_) | Prescribed::Field(_) => !c.components.depends_on_time(),
         Prescribed::Spring(_) => true,
-        Prescribed::Velocity(_)
-        | Prescribed::Traction(_)
-        | Prescribed::Pressure(_)
-        | Prescribed::BodyForce(_) => false,
+        Prescribed::Velocity(_) | Prescribed::Load(_) => false,
     };
     let is_free = is_linear
         && rest.impactors.is_empty()

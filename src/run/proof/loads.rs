@@ -2,6 +2,8 @@
 //!
 //! The model's side is the sum over its sites, of their masses and forces and of these times their positions. The other side knows of no site: it is the integral over the cells and facets of the mesh by the mesh's own quadrature.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use super::Subject;
 use crate::coupling::tributary::Moments;
 use crate::coupling::{CellRole, Model, Zone};
@@ -15,7 +17,8 @@ use crate::run::loads::{
     BodyForces, Loads, cells_of, may_bound_zone, nearest_points, site_of_node,
 };
 use crate::scene::Expression;
-use crate::scene::conditions::{Condition, Prescribed, Support};
+use crate::scene::conditions::{Condition, Support};
+use crate::scene::load::Domain;
 use crate::system::Symmetry;
 use crate::tensor::Vector;
 
@@ -46,8 +49,10 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
     let mut is_needed = vec![moves; masses.len()];
     let loads = Loads::new(model, conditions, BodyForces::Consistent)?;
     let mut count = 0;
-    for condition in loads.conditions() {
-        let c = &conditions[condition];
+    for (condition, c) in conditions.iter().enumerate() {
+        let Some(on) = c.load().map(|load| &load.on) else {
+            continue;
+        };
         let at_once = steady(c);
         let mut load = vec![0.0; model.sites.len() * D];
         at_once.visit(0.0, |field| loads.add(condition, field, &mut load));
@@ -60,7 +65,8 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
         for (needed, f) in is_needed.iter_mut().zip(load.chunks_exact(D)) {
             *needed |= f.iter().any(|&f| f != 0.0);
         }
-        let exact = at_once.visit(0.0, |field| exact(model, c, field));
+        let domain = (on, c.components.depends_on_position());
+        let exact = at_once.visit(0.0, |field| exact(model, domain, field));
         let figure = compare(model, &c.name, "load", &own, &exact, &mut part);
         worst = worst.max(figure);
         count += 1;
@@ -110,7 +116,7 @@ struct Exact<const D: usize> {
 /// The integral of a load over the mesh, and of the load times the position.
 fn exact<const D: usize>(
     model: &Model<D>,
-    condition: &Condition<D>,
+    (on, varies): (&Domain<D>, bool),
     field: impl Fn(&Vector<D>, &Vector<D>) -> Vector<D>,
 ) -> Exact<D> {
     let mesh = &model.mesh;
@@ -128,21 +134,21 @@ fn exact<const D: usize>(
         found.turned += f.norm() * (x - centre).norm();
         found.moments.add(&f, &(x - centre));
     };
-    match &condition.prescribed {
-        Prescribed::Traction(facets) => {
+    match on {
+        Domain::Facets(facets) => {
             for facet in facets {
                 let add = |p: &fem::FacetPoint<D>| add(&p.position, &none, p.weight, &mut found);
                 fem::facet_points(mesh, facet, add);
             }
         }
-        Prescribed::Pressure(facets) => {
+        Domain::Surface(facets) => {
             for facet in facets {
                 let add =
                     |p: &fem::FacetPoint<D>| add(&p.position, &p.normal, p.weight, &mut found);
                 fem::outward_points(mesh, facet, add);
             }
         }
-        Prescribed::BodyForce(region) => {
+        Domain::Cells(region) => {
             let inside = cells_of(model, region);
             for c in (0..inside.len()).filter(|&c| inside[c]) {
                 fem::for_each_point(mesh, c, fem::Rule::Mass, |p| {
@@ -150,10 +156,9 @@ fn exact<const D: usize>(
                 });
             }
         }
-        _ => {}
     }
-    if condition.components.depends_on_position() {
-        found.uncertain = coarser(model, condition, &field, &found.moments.force);
+    if varies {
+        found.uncertain = coarser(model, on, &field, &found.moments.force);
     }
     found
 }
@@ -161,22 +166,22 @@ fn exact<const D: usize>(
 /// What the middles of cells or facets alone make of the integral of a field that varies, as a difference from `fine`: rules of other points differ by less.
 fn coarser<const D: usize>(
     model: &Model<D>,
-    condition: &Condition<D>,
+    on: &Domain<D>,
     field: impl Fn(&Vector<D>, &Vector<D>) -> Vector<D>,
     fine: &Vector<D>,
 ) -> f64 {
     let mesh = &model.mesh;
     let none = Vector::zeros();
     let mut sum = Vector::<D>::zeros();
-    match &condition.prescribed {
-        Prescribed::Traction(facets) => {
+    match on {
+        Domain::Facets(facets) => {
             for facet in facets {
                 let nodes = facet.iter().map(|&n| mesh.nodes[n as usize]);
                 let middle = nodes.sum::<Vector<D>>() / facet.len() as f64;
                 sum += field(&middle, &none) * fem::facet_area(mesh, facet);
             }
         }
-        Prescribed::Pressure(facets) => {
+        Domain::Surface(facets) => {
             for facet in facets {
                 let nodes = facet.nodes.iter().map(|&n| mesh.nodes[n as usize]);
                 let middle = nodes.sum::<Vector<D>>() / facet.nodes.len() as f64;
@@ -184,13 +189,12 @@ fn coarser<const D: usize>(
                 sum += field(&middle, &area.normalize()) * area.norm();
             }
         }
-        Prescribed::BodyForce(region) => {
+        Domain::Cells(region) => {
             let inside = cells_of(model, region);
             for c in (0..inside.len()).filter(|&c| inside[c]) {
                 sum += field(&mesh.centroid(c), &none) * fem::cell_volume(mesh, c);
             }
         }
-        _ => {}
     }
     (sum - fine).norm()
 }
@@ -358,17 +362,14 @@ fn without_mass<const D: usize>(
 ///
 /// Measured: of the weight of a plate held there, blending lost 25 to 45 %, balanced 48 %, partial stress 26 %, a splice, which mixes nothing, 0.8 %.
 fn unbalanced<const D: usize>(model: &Model<D>, condition: &Condition<D>) -> Option<Finding> {
-    let pressed: Vec<Facet>;
-    let facets = match &condition.prescribed {
-        Prescribed::Traction(facets) => facets,
-        Prescribed::Pressure(facets) => {
-            pressed = facets.iter().map(|f| f.nodes.clone()).collect();
-            &pressed
+    let of_load: Vec<Facet>;
+    let facets = match (condition.load(), condition.support()) {
+        (Some(load), _) => {
+            of_load = load.on.facets().into_iter().map(Facet::from).collect();
+            &of_load
         }
-        _ => match condition.support()? {
-            Support::Set { facets, .. } => facets,
-            Support::Inside(_) => return None,
-        },
+        (None, Some(Support::Set { facets, .. })) => facets,
+        (None, Some(Support::Inside(_)) | None) => return None,
     };
     let has_stress = model.roles.contains(&CellRole::StressElement);
     if !has_stress && !may_bound_zone(model, facets) {

@@ -260,15 +260,17 @@ fn kinds<const D: usize>(
     }
     for condition in conditions {
         let loaded: Vec<&[u32]> = match &condition.prescribed {
-            Prescribed::Traction(loaded) => loaded.iter().map(AsRef::as_ref).collect(),
-            Prescribed::Pressure(loaded) => loaded.iter().map(|f| f.nodes.as_ref()).collect(),
+            Prescribed::Load(load) => load.on.facets(),
             Prescribed::Spring(Bedding::Axes { facets, .. }) => {
                 facets.iter().map(AsRef::as_ref).collect()
             }
             Prescribed::Spring(Bedding::Normal { facets, .. }) => {
                 facets.iter().map(|f| f.nodes.as_ref()).collect()
             }
-            _ => Vec::new(),
+            Prescribed::Spring(Bedding::Inside { .. })
+            | Prescribed::Displacement(_)
+            | Prescribed::Velocity(_)
+            | Prescribed::Field(_) => Vec::new(),
         };
         for nodes in loaded {
             if let Some(&f) = sorted.get(&key(nodes)) {

@@ -27,10 +27,7 @@ mod region;
 mod table;
 mod user_material;
 
-pub use condition::{
-    BodyForceSpec, ConditionSpec, DisplacementSpec, PressureSpec, RotationSpec, SpringSpec,
-    SymmetrySpec, TemperatureSpec, TractionSpec, VelocitySpec, VoidSpec,
-};
+pub use condition::{TemperatureSpec, VoidSpec};
 pub use control::{
     LineSpec, OutputSpec, PointOutputSpec, ProbeSpec, SectionSpec, SolverSpec, StressSpec,
     UnprovenSpec,
@@ -69,6 +66,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::condition_kinds::ConditionSpec;
 use super::value::{Number, Text};
 
 /// A scene of bondline: a body that is finite elements here and peridynamics there, at rest or in motion.

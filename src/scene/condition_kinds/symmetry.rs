@@ -1,0 +1,73 @@
+//! Planes of symmetry.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::ConditionKind;
+use crate::mesh::Mesh;
+use crate::scene::components::Components;
+use crate::scene::conditions::{Condition, Prescribed};
+use crate::scene::error::{SceneError, SceneErrorKind};
+use crate::scene::expression::Expression;
+use crate::scene::places::support;
+use crate::scene::solve::Clock;
+use crate::scene::value::Text;
+
+/// A plane of symmetry along the axes.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct SymmetrySpec {
+    /// A named set of the mesh, all of whose nodes lie in one plane x, y or z = constant.
+    pub on: Text,
+}
+
+impl ConditionKind for SymmetrySpec {
+    fn build<const D: usize>(
+        &self,
+        place: &str,
+        name: &Text,
+        mesh: &Mesh<D>,
+        _clock: Clock,
+    ) -> Result<Condition<D>, SceneError> {
+        let support = support(place, name, Some(&self.on), None, mesh)?;
+        let nodes = mesh.nodes_of_set(&self.on.value).unwrap_or_default();
+        let (low, high) = mesh.bounds();
+        let tolerance = 1e-9 * (high - low).norm();
+        let (from, to) = mesh.bounds_of(&nodes);
+        let flat: Vec<usize> = (0..D).filter(|&k| to[k] - from[k] <= tolerance).collect();
+        let refuse = |why: String, help: &str| {
+            Err(
+                SceneError::new(SceneErrorKind::Conflict, format!("`{place}.on`: {why}"))
+                    .label(self.on.span.clone(), "whose normal?")
+                    .help(help),
+            )
+        };
+        match flat[..] {
+            [axis] => Ok(Condition {
+                name: name.value.clone(),
+                prescribed: Prescribed::Displacement(support),
+                components: Components::only(
+                    axis,
+                    Expression::constant(0.0).at(self.on.span.clone()),
+                ),
+            }),
+            [] => refuse(
+                format!(
+                    "the set `{}` reaches from {:?} to {:?}: it is no plane x, y or z = constant",
+                    self.on,
+                    from.as_slice(),
+                    to.as_slice()
+                ),
+                "turn the mesh so that its planes of symmetry lie along the axes, or hold the set by stiff [conditions.NAME.spring] with normal = ...",
+            ),
+            _ => refuse(
+                format!(
+                    "the set `{}` at {:?} has no area: its normal is not known",
+                    self.on,
+                    from.as_slice()
+                ),
+                "name the set of all facets of the plane, or prescribe a displacement by its components",
+            ),
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! Prescribed velocities.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::ConditionKind;
+use crate::mesh::Mesh;
+use crate::scene::components::{Components, components_in, finite};
+use crate::scene::conditions::{Condition, Prescribed, Support};
+use crate::scene::error::{SceneError, SceneErrorKind};
+use crate::scene::expression::Expression;
+use crate::scene::places::support;
+use crate::scene::solve::{Clock, Pacing};
+use crate::scene::spec::ShapeSpec;
+use crate::scene::value::Text;
+
+/// Prescribed velocity: exactly one of `on` and `inside`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct VelocitySpec {
+    /// A named set of the mesh. Where peridynamics meets the set, points within three quarters of their spacing of it follow it: the first layer.
+    #[serde(default)]
+    pub on: Option<Text>,
+    /// All sites inside a shape.
+    #[serde(default)]
+    pub inside: Option<ShapeSpec>,
+    /// Velocity along x.
+    #[serde(default)]
+    pub x: Option<Expression>,
+    /// Velocity along y.
+    #[serde(default)]
+    pub y: Option<Expression>,
+    /// Velocity along z.
+    #[serde(default)]
+    pub z: Option<Expression>,
+}
+
+impl ConditionKind for VelocitySpec {
+    fn build<const D: usize>(
+        &self,
+        place: &str,
+        name: &Text,
+        mesh: &Mesh<D>,
+        clock: Clock,
+    ) -> Result<Condition<D>, SceneError> {
+        let components = components_in(place, name, [&self.x, &self.y, &self.z], clock)?;
+        moves(place, name, &components, clock)?;
+        let support = support(place, name, self.on.as_ref(), self.inside.as_ref(), mesh)?;
+        if let Support::Set { nodes, .. } = &support {
+            let nodes = nodes.iter().map(|&n| mesh.nodes[n as usize]);
+            finite(place, name, &components, clock, nodes)?;
+        }
+        Ok(Condition {
+            name: name.value.clone(),
+            prescribed: Prescribed::Velocity(support),
+            components,
+        })
+    }
+}
+
+/// Checks that a velocity is one that a run can follow.
+fn moves<const D: usize>(
+    place: &str,
+    name: &Text,
+    components: &Components<D>,
+    clock: Clock,
+) -> Result<(), SceneError> {
+    if clock.pacing != Pacing::Moving {
+        return Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!("`{place}` in a scene that does not move"),
+        )
+        .label(name.span.clone(), "a velocity")
+        .help("add [solve.explicit] with duration = ..., or prescribe a displacement"));
+    }
+    match components
+        .0
+        .iter()
+        .flatten()
+        .find(|e| e.depends_on_time() && e.depends_on_position())
+    {
+        None => Ok(()),
+        Some(e) => Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!("`{place}` depends on time and on position"),
+        )
+        .label(e.span.clone(), "has no displacement in closed form")
+        .help("prescribe the displacement, its integral over t; or let the velocity depend on one of the two")),
+    }
+}
