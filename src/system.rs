@@ -9,6 +9,7 @@
 //! | `element_tangent.rs`, `springs.rs`, `neighbour_springs.rs` | what elements and springs add to the tangent |
 //! | `ranks.rs`, `partition.rs`, `ghosts.rs`, `shared_steps.rs` | several processes, and which sites each has |
 //! | `place_stress.rs` | the stress of a place |
+//! | `term.rs`, `with_terms.rs` | force terms beside a body, and their sum |
 //! | `linear_motion.rs`, `wrapped.rs` | a system of a matrix, and one around another |
 
 use crate::parallel;
@@ -26,6 +27,8 @@ mod shared_blocks;
 mod shared_steps;
 mod spmv;
 mod springs;
+mod term;
+mod with_terms;
 pub(crate) mod wrapped;
 
 pub use element_tangent::ElementTangent;
@@ -41,7 +44,9 @@ pub use segments::Segments;
 pub use shared_blocks::{GatheredRows, RowBatch, SharedRows};
 pub use shared_steps::{LostToBreaks, SharedSteps};
 pub use spmv::ROW_CHUNK;
-pub use springs::{SpringRows, Sprung};
+pub use springs::SpringRows;
+pub use term::{ForceTerm, RateBounds};
+pub use with_terms::WithTerms;
 
 /// Whether the tangent of a system is symmetric; solvers choose by it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]

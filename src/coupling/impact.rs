@@ -12,7 +12,7 @@
 //! so that contact begins at the surface wherever the lattice lies.
 //!
 //! An impactor is one more site of the system that moves, with the mass of the impactor: one set of steps, energies, supports and checkpoints serves body and impactors
-//! ([`ImpactedSystem`]).
+//! ([`crate::system::WithTerms`]).
 //!
 //! **Stable step.** `k/m = factor (c/h)²` with the speed `c = √(C₁₁/ρ)` of longitudinal waves. Of sites that touch a free impactor of mass `M`, contact adds to the eigenvalues at most
 //! `max k/m + Σ k / M`. The sum is bounded by the largest area that can touch: `factor · max(C₁₁/h)` times [`ImpactorShape::largest_area`]. A site between two impactors feels both: the two largest bounds are added.
@@ -27,10 +27,9 @@ use crate::{coupling::Model, parallel};
 
 mod clearance;
 mod shape;
-mod system;
+mod term;
 
 pub use shape::ImpactorShape;
-pub use system::ImpactedSystem;
 
 /// Sites per task; a constant, so that no result depends on the number of threads.
 const CHUNK: usize = 1024;

@@ -79,7 +79,7 @@ pub use bins::{Bins, bin_of};
 pub use blending::{Blending, BlendingFunction};
 pub use exact_stresses::ExactStresses;
 pub use field_evaluation::{Carrier, Sampler};
-pub use impact::{ContactPatch, Impact, ImpactedSystem, ImpactorShape, RigidImpactor};
+pub use impact::{ContactPatch, Impact, ImpactorShape, RigidImpactor};
 pub use least_squares_gradient::FitDegree;
 pub use model::{Model, Site, SiteKind};
 pub use partial_stress::PartialStressMeshfree;

@@ -25,7 +25,7 @@ use crate::solve::statics::{
     self, Method, MethodUsed, SpreadProblem, SpreadRows, StaticError, StaticInfo, StaticParams,
     StaticProblem, StaticSolution,
 };
-use crate::system::{BlockCsr, Ranks, SemiDiscrete, Spread, Sprung, Symmetry};
+use crate::system::{BlockCsr, Ranks, SemiDiscrete, Spread, Symmetry, WithTerms};
 use crate::tensor::padded;
 
 /// A model at rest under its conditions, about to be solved.
@@ -135,7 +135,7 @@ pub(crate) fn equilibrium<const D: usize>(
             (solution, internal, energy)
         }
         Some(system) => {
-            let mut sprung = Sprung::new(system, &springs.all);
+            let mut sprung = WithTerms::new(system, vec![Box::new(&springs.all)]);
             nonlinear(&mut sprung, &static_problem, &params, model, progress)?
         }
     };

@@ -1,10 +1,8 @@
-//! Springs between sites and the ground: rows that are added to a stiffness, and a system that has them.
+//! Springs between sites and the ground: rows that are added to a stiffness, and a force term.
 
 use std::collections::BTreeMap;
-use std::ops::DerefMut;
 
-use super::wrapped::{fields_of, state_of};
-use super::{BlockCsr, FailureUpdate, Interval, SemiDiscrete, SharedRows};
+use super::{BlockCsr, ForceTerm, Interval, RateBounds, SharedRows};
 
 /// The stiffness `S` of springs between sites and the ground \[N/m\]: symmetric, and no displacement has a negative energy.
 ///
@@ -126,7 +124,7 @@ impl SpringRows {
     }
 
     /// Adds `Σ_b |S_ab|` to every scalar row's sum.
-    fn add_row_sums(&self, sums: &mut [f64]) {
+    fn add_sums_to(&self, sums: &mut [f64]) {
         let d = self.rows.block;
         self.each(|site, _, blocks| {
             for block in blocks.chunks_exact(d * d) {
@@ -139,102 +137,51 @@ impl SpringRows {
     }
 }
 
-/// A system with springs to the ground: `F(u) + S u`.
-#[derive(Debug)]
-pub struct Sprung<'s, S> {
-    system: S,
-    springs: &'s SpringRows,
-}
-
-impl<'s, S> Sprung<'s, S> {
-    /// A system, and what is added to it.
-    pub fn new(system: S, springs: &'s SpringRows) -> Self {
-        Self { system, springs }
-    }
-}
-
-impl<S> SemiDiscrete for Sprung<'_, S>
-where
-    S: DerefMut + Send + Sync,
-    S::Target: SemiDiscrete,
-{
-    state_of!(system);
-    fields_of!(system);
-
-    fn internal_force_into(
-        &mut self,
-        u: &[f64],
-        force: &mut [f64],
-        interval: Interval,
-        breakage: FailureUpdate,
-    ) -> u64 {
-        let broken = self
-            .system
-            .internal_force_into(u, force, interval, breakage);
-        self.springs.add_product(u, force);
-        broken
+impl ForceTerm for &SpringRows {
+    fn own_masses(&self) -> Vec<f64> {
+        Vec::new()
     }
 
-    fn force_of_heating_into(
-        &mut self,
-        u: &[f64],
-        force: &mut [f64],
-        from: Option<f64>,
-        to: f64,
-    ) -> bool {
-        let is_heated = self.system.force_of_heating_into(u, force, from, to);
-        if is_heated {
-            self.springs.add_product(u, force);
-        }
-        is_heated
+    fn add_force(&mut self, u: &[f64], force: &mut [f64], _interval: Interval) {
+        self.add_product(u, force);
     }
 
-    fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
-        self.system.tangent_into(x, y);
-        self.springs.add_product(x, y);
+    fn rows(&self) -> Option<&SpringRows> {
+        Some(self)
     }
 
-    fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {
-        self.system.force_beside_elements_into(u, force, interval);
-        self.springs.add_product(u, force);
-    }
-
-    fn row_sums(&self) -> Vec<f64> {
-        let mut sums = self.system.row_sums();
-        self.springs.add_row_sums(&mut sums);
-        sums
-    }
-
-    fn tangent_rows(&self, sites: &[u32]) -> BlockCsr {
-        self.springs.added(&self.system.tangent_rows(sites), sites)
-    }
-
-    fn stored_energy(&self, u: &[f64]) -> f64 {
-        self.system.stored_energy(u) + self.springs.energy(u)
-    }
-
-    fn block(&self) -> usize {
-        self.system.block()
-    }
-
-    fn mass(&self) -> &[f64] {
-        self.system.mass()
+    fn add_row_sums(&self, sums: &mut Vec<f64>) {
+        self.add_sums_to(sums);
     }
 
     fn difference_length(&self) -> Option<f64> {
-        self.system.difference_length()
+        None
     }
 
-    fn contact_frequency_bound(&self) -> f64 {
-        self.system.contact_frequency_bound()
+    fn rate_bounds(&self, _mass: &[f64]) -> RateBounds {
+        RateBounds::default()
     }
 
-    fn tangent_is_constant(&self) -> Vec<bool> {
-        self.system.tangent_is_constant()
+    fn round_off(&self, _u: &[f64]) -> f64 {
+        0.0
     }
 
-    fn seam_sites(&self) -> Vec<u32> {
-        self.system.seam_sites()
+    fn energy(&self, u: &[f64]) -> f64 {
+        SpringRows::energy(self, u)
+    }
+
+    fn commit(&mut self) {}
+
+    fn dissipated(&self) -> Option<f64> {
+        None
+    }
+
+    fn state(&self) -> Vec<u64> {
+        Vec::new()
+    }
+
+    fn restore(&mut self, state: &[u64]) -> bool {
+        state.is_empty()
     }
 }
 
@@ -296,7 +243,7 @@ mod tests {
             assert_eq!(sum.row(1).0, [1, 2, 3]);
             // bounds of the rows hold for the sum
             let mut sums = plain.row_sums();
-            springs().add_row_sums(&mut sums);
+            springs().add_sums_to(&mut sums);
             assert!(sum.row_sums().iter().zip(&sums).all(|(a, b)| a <= b));
         }
         let energy = springs().energy(&x);

@@ -3,13 +3,9 @@
 //! Most methods of [`SemiDiscrete`](super::SemiDiscrete) have a default, for bodies in which nothing breaks and no law remembers. A wrapper that left one out would have the
 //! default in place of the answer of the body, so those that no wrapper changes stand here, once for all of them.
 
-/// Methods of what a body remembers and of what has broken, handed on to the field `$system`.
-macro_rules! state_of {
+/// Methods that neither a displacement nor the terms beside a body change, handed on to the field `$system`.
+macro_rules! body_of {
     ($system:ident) => {
-        fn commit(&mut self) {
-            self.$system.commit();
-        }
-
         fn take_heat_work(&mut self) -> f64 {
             self.$system.take_heat_work()
         }
@@ -18,20 +14,12 @@ macro_rules! state_of {
             self.$system.rows_that_expand(sites)
         }
 
-        fn drag_rate_bound(&self) -> f64 {
-            self.$system.drag_rate_bound()
+        fn seam_sites(&self) -> Vec<u32> {
+            self.$system.seam_sites()
         }
 
         fn symmetry(&self) -> $crate::system::Symmetry {
             self.$system.symmetry()
-        }
-
-        fn dissipation(&self) -> Option<$crate::system::Dissipation> {
-            self.$system.dissipation()
-        }
-
-        fn set_dissipation(&mut self, dissipation: $crate::system::Dissipation) {
-            self.$system.set_dissipation(dissipation);
         }
 
         fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
@@ -56,6 +44,29 @@ macro_rules! state_of {
 
         fn broken_bonds(&self) -> Vec<(u32, u32)> {
             self.$system.broken_bonds()
+        }
+    };
+}
+
+/// Methods of what a body remembers and of what has broken, handed on to the field `$system`.
+macro_rules! state_of {
+    ($system:ident) => {
+        $crate::system::wrapped::body_of!($system);
+
+        fn commit(&mut self) {
+            self.$system.commit();
+        }
+
+        fn drag_rate_bound(&self) -> f64 {
+            self.$system.drag_rate_bound()
+        }
+
+        fn dissipation(&self) -> Option<$crate::system::Dissipation> {
+            self.$system.dissipation()
+        }
+
+        fn set_dissipation(&mut self, dissipation: $crate::system::Dissipation) {
+            self.$system.set_dissipation(dissipation);
         }
 
         fn damage_state(&self) -> Vec<u64> {
@@ -105,4 +116,4 @@ macro_rules! fields_of {
     };
 }
 
-pub(crate) use {fields_of, state_of};
+pub(crate) use {body_of, fields_of, state_of};

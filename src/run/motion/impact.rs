@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::dynamic_system::DynamicSystem;
-use crate::coupling::{Impact, ImpactedSystem, Model, RigidImpactor};
+use crate::coupling::{Impact, Model, RigidImpactor};
 use crate::observe::report::number;
 use crate::observe::summary::Decision;
 use crate::run::error::RunError;
@@ -11,6 +11,7 @@ use crate::run::setup::RunSettings;
 use crate::scene::impactors::Impactor;
 use crate::solve::explicit::State;
 use crate::solve::krylov::LinearMap;
+use crate::system::WithTerms;
 
 /// Depth inside an impactor at time zero over the size of the body, up to which a body touches it only.
 const TOUCHES: f64 = 1e-9;
@@ -62,7 +63,10 @@ pub(crate) fn impacted<'a, const D: usize>(
     let impact = Arc::new(impact);
     let moving = DynamicSystem {
         bytes: moving.bytes + impact.memory_bytes(),
-        system: Box::new(ImpactedSystem::new(moving.system, Arc::clone(&impact))),
+        system: Box::new(WithTerms::new(
+            moving.system,
+            vec![Box::new(Arc::clone(&impact))],
+        )),
         is_linear: false,
         has_exact_seam: moving.has_exact_seam,
     };

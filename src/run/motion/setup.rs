@@ -17,7 +17,7 @@ use crate::run::setup::{self, RunSettings};
 use crate::run::springs::Springs;
 use crate::scene::spec::CouplingTraits;
 use crate::scene::validated::Scene;
-use crate::system::{Ranks, SemiDiscrete, Sprung};
+use crate::system::{Ranks, SemiDiscrete, WithTerms};
 
 /// A scene with all that it computes before its first step.
 pub struct ModelSetup<'a, const D: usize> {
@@ -136,7 +136,7 @@ pub(crate) fn lay_out<const D: usize, T>(
     proof::hold(&proof)?;
     watch.lap(&mut timings, "proof");
     if !springs.is_empty() {
-        moving.system = Box::new(Sprung::new(moving.system, &springs.all));
+        moving.system = Box::new(WithTerms::new(moving.system, vec![Box::new(&springs.all)]));
     }
     let done = then(ModelSetup {
         title,

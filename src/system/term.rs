@@ -1,0 +1,54 @@
+//! Force terms beside those of the body: `f(u) = F_body(u) + Σ F_k(u)`.
+
+use super::{Interval, SpringRows};
+
+/// Bounds of what a term may add to the eigenvalues of the motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RateBounds {
+    /// Of `M⁻¹ K` that rest does not show \[1/s²\]: contact.
+    pub stiffness: f64,
+    /// Of `M⁻¹ C` of forces `C v` against the velocities of the interval \[1/s\].
+    pub drag: f64,
+}
+
+/// One term of the sum: springs to the ground, impactors, dashpots, loads that follow the body. It knows its own places, and neither the body nor other terms.
+///
+/// Shapes: `u`, `force` and `sums` have the unknowns of all sites, those of the body first and then the term's own. Every method is required: a term that leaves a force, an energy or a bound out
+/// says so.
+pub trait ForceTerm: Send + Sync {
+    /// Masses \[kg\] of the sites that the term has beside those of the body; empty for a term on the body alone. At most one term of a system has some.
+    fn own_masses(&self) -> Vec<f64>;
+
+    /// Adds its force at the displacement `u` that ends an interval to `force` \[N\], in the sense of an internal force.
+    fn add_force(&mut self, u: &[f64], force: &mut [f64], interval: Interval);
+
+    /// Its tangent at rest; none if it vanishes there.
+    fn rows(&self) -> Option<&SpringRows>;
+
+    /// Adds an upper bound of `Σ_b |K_ab|` of its tangent at rest to the `sums` of the body's unknowns, and appends those of its own.
+    fn add_row_sums(&self, sums: &mut Vec<f64>);
+
+    /// The displacement \[m\] over which its force is differenced where its tangent is wanted; none for a force that is linear in the displacement.
+    fn difference_length(&self) -> Option<f64>;
+
+    /// What it may add to the eigenvalues of the motion, `mass` being that of the body's sites.
+    fn rate_bounds(&self, mass: &[f64]) -> RateBounds;
+
+    /// Norm of the force \[N\] that rounding of places leaves at a displacement.
+    fn round_off(&self, u: &[f64]) -> f64;
+
+    /// The energy that it stores \[J\].
+    fn energy(&self, u: &[f64]) -> f64;
+
+    /// Ends the interval at the displacement of the last [`ForceTerm::add_force`].
+    fn commit(&mut self);
+
+    /// The energy that it has dissipated up to the last [`ForceTerm::commit`] \[J\]; none for a term that never does.
+    fn dissipated(&self) -> Option<f64>;
+
+    /// What it remembers, for a checkpoint; empty for a term without memory.
+    fn state(&self) -> Vec<u64>;
+
+    /// Puts back what [`ForceTerm::state`] gave; false if it belongs to another term.
+    fn restore(&mut self, state: &[u64]) -> bool;
+}
