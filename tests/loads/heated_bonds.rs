@@ -34,8 +34,6 @@ const MATERIALS: [&str; 7] = [
     "pals = { youngs-modulus = 200, poisson-ratio = 0.3, critical-stretch = 0.011, density = 1 EXPANDS }",
 ];
 
-const ALPHA: f64 = 1e-3;
-
 /// The strip of a material, heated where it has a temperature.
 fn strip(material: &str, bonds: &str, right: &str, temperature: Option<&str>) -> String {
     let (expands, heat) = match temperature {

@@ -43,6 +43,7 @@ enum Way {
 }
 
 /// A body that expands by `stretch`: free but for its planes of symmetry, or held everywhere; in time it begins as it will be.
+// One function: the text of a scene.
 fn scene(
     kinematics: Kinematics,
     stuff: &Stuff,
@@ -59,9 +60,9 @@ fn scene(
             "[0.9, 0.9]",
         ),
         _ => (
-            "box = { min = [0, 0, 0], max = [1.4, 1.4, 1.2], x = { cells = 7 }, y = { cells = 7 }, z = { cells = 6 } }",
+            "box = { min = [0, 0, 0], max = [1.4, 1.4, 1.4], x = { cells = 7 }, y = { cells = 7 }, z = { cells = 7 } }",
             "min = [0.4, 0.4, 0.4], max = [0.8, 0.8, 0.8]",
-            "[0.7, 0.7, 0.5]",
+            "[0.7, 0.7, 0.7]",
         ),
     };
     let peridynamics = match coupling {
@@ -84,7 +85,7 @@ fn scene(
             let held = match way {
                 // some freedom sets the step in time, away from the family of the probe
                 Way::InTime if dimension == 2 => "box = { min = [-1, -1], max = [3, 1.65] }",
-                Way::InTime => "box = { min = [-1, -1, -1], max = [3, 3, 1.1] }",
+                Way::InTime => "box = { min = [-1, -1, -1], max = [3, 3, 1.25] }",
                 Way::AtRest | Way::LoadSteps => "everywhere = true",
             };
             format!("conditions.all.displacement = {{ inside.{held}, {zero} }}\n")

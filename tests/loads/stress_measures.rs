@@ -313,6 +313,7 @@ fn hooke(kinematics: Kinematics, poisson: f64, size: f64) -> [[f64; 3]; 3] {
 const STRAIN: f64 = 2e-3;
 
 /// Checks one law one way; returns how often its stress was seen to turn, none if the scene is refused.
+// One function: four states of one body, compared in turn.
 fn checked(
     kinematics: Kinematics,
     stuff: &Stuff,
@@ -406,7 +407,9 @@ fn check(kinematics: Kinematics, ways: &[Way]) {
                 turned += checked.unwrap_or(0);
             }
         }
-        assert!(ran, "nothing runs with {}", stuff.text);
+        // a drag resists motion in time alone
+        let runs = ways.contains(&Way::InTime) || !stuff.text.contains("drag");
+        assert!(ran || !runs, "nothing runs with {}", stuff.text);
     }
     assert!(turned > 8 * ways.len(), "{turned}");
 }

@@ -262,12 +262,14 @@ fn stress_of_energy<const D: usize>(counts: [usize; D]) {
                         };
                         (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * step)
                     });
+                    let local = law.force_state().and_then(|s| s.correspondence(Some(0)));
+                    let turns = local.is_some_and(|stress| stress.law.is_objective());
                     let wanted = match kinematics {
-                        BondKinematics::Exact => {
+                        BondKinematics::Linear if !turns => derivative,
+                        BondKinematics::Exact | BondKinematics::Linear => {
                             derivative * deformed.transpose()
                                 / crate::tensor::determinant(&deformed)
                         }
-                        BondKinematics::Linear => derivative,
                     };
                     let u = field(&deformed);
                     let at = |k: usize| Vector::from_fn(|a, _| u[k * D + a]);
