@@ -50,6 +50,7 @@ mod interface_interpolation;
 mod lattice_axes;
 mod lattice_box;
 pub mod least_squares_gradient;
+pub(crate) mod loaded_places;
 pub mod model;
 mod multi_lattice;
 pub mod partial_stress;

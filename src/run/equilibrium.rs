@@ -6,8 +6,8 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 use super::budget;
+use super::condition_terms::ConditionTerms;
 use super::loads::{loads, supports};
-use super::springs::Springs;
 use crate::coupling::{Coupling, Distribution, Model, Operator};
 use crate::observe::summary::{Applied, Decision, Stopwatch, Timings};
 use crate::progress::Progress;
@@ -65,7 +65,7 @@ pub(crate) struct Equilibrium {
     /// Internal force \[N\] at the solution.
     pub internal: Vec<f64>,
     /// What springs hold the body.
-    pub springs: Springs,
+    pub terms: ConditionTerms,
     /// Energy stored there and in springs \[J\]; none of a matrix that is not symmetric.
     pub energy: Option<f64>,
     /// What the symmetry of the matrix decided.
@@ -98,7 +98,7 @@ pub(crate) fn equilibrium<const D: usize>(
     }
     let mut watch = Stopwatch::start();
     let model = at.model;
-    let springs = Springs::new(model, at.conditions)?;
+    let terms = ConditionTerms::new(model, at.conditions)?;
     let mut stiffness = model.assemble(at.operator, progress);
     watch.lap(&mut timings, "assembly");
     let (mut load, applied) = loads(model, at.conditions, at.time)?;
@@ -116,7 +116,7 @@ pub(crate) fn equilibrium<const D: usize>(
     let symmetry = symmetry(at.coupling, || stiffness.asymmetry(), &mut choices);
     watch.lap(&mut timings, "conditions");
     timings.add("proof", prove(&Assembled::Whole(&stiffness))?);
-    springs.all.add_to(&mut stiffness);
+    terms.rows.add_to(&mut stiffness);
     let static_problem = StaticProblem {
         stiffness: &stiffness,
         symmetry,
@@ -135,12 +135,12 @@ pub(crate) fn equilibrium<const D: usize>(
             (solution, internal, energy)
         }
         Some(system) => {
-            let mut sprung = WithTerms::new(system, vec![Box::new(&springs.all)]);
+            let mut sprung = WithTerms::new(system, terms.all());
             nonlinear(&mut sprung, &static_problem, &params, model, progress)?
         }
     };
     // what springs take is no force within the body
-    springs.take_from(&mut internal, &solution.displacement);
+    terms.take_from(&mut internal, &solution.displacement);
     if let Some(expands) = expands {
         take_expansion(&mut internal, &mut load, &expands);
         energy = None;
@@ -158,7 +158,7 @@ pub(crate) fn equilibrium<const D: usize>(
         solution,
         internal,
         energy,
-        springs,
+        terms,
         choices,
         timings,
     })
@@ -235,7 +235,7 @@ fn spread<const D: usize>(
     prove: impl FnOnce(&Assembled<'_>) -> Result<f64, RunError>,
     progress: &dyn Progress,
 ) -> Result<Equilibrium, RunError> {
-    if !Springs::new(at.model, at.conditions)?.is_empty() {
+    if !ConditionTerms::new(at.model, at.conditions)?.is_empty() {
         return Err(RunError::Later {
             what: "springs in a static scene of several processes",
             remedy: "run it in one process, or in load steps: solve.quasi-static.steps = 1",
@@ -296,7 +296,7 @@ fn spread<const D: usize>(
         solution,
         internal,
         energy,
-        springs: Springs::default(),
+        terms: ConditionTerms::default(),
         choices,
         timings,
     })

@@ -6,15 +6,15 @@ use std::collections::BTreeMap;
 
 use crate::coupling::{CellRole, Model, SiteKind};
 use crate::fem;
+use crate::mesh::Facet;
 use crate::mesh::boundary::BoundaryFacet;
-use crate::mesh::{Facet, facet_corners};
 use crate::observe::summary::Applied;
 use crate::run::error::RunError;
 use crate::scene::conditions::{Components, Condition, Prescribed, Support};
 use crate::scene::load::Domain;
-use crate::scene::region::Region;
 use crate::tensor::Vector;
 use crate::{
+    coupling::loaded_places::{may_bound_zone, split_facets},
     coupling::tributary::{Detail, Parts},
     parallel,
 };
@@ -169,7 +169,7 @@ pub(crate) fn displacement<const D: usize>(
         Prescribed::Displacement(_)
         | Prescribed::Velocity(_)
         | Prescribed::Load(_)
-        | Prescribed::Spring(_) => holder.components.at_time(dof % D, x, t).unwrap_or(0.0),
+        | Prescribed::Term(_) => holder.components.at_time(dof % D, x, t).unwrap_or(0.0),
     }
 }
 
@@ -296,7 +296,7 @@ impl<'a, const D: usize> Loads<'a, D> {
                     (Vec::new(), Vec::new(), parts)
                 }
                 Domain::Cells(region) => {
-                    let inside = cells_of(model, region);
+                    let inside = region.select_cells(&model.mesh);
                     let own = (0..inside.len()).filter(|&c| inside[c] && model.is_element(c));
                     let own = own.collect();
                     let zone: Vec<bool> = (0..inside.len())
@@ -402,41 +402,6 @@ impl<'a, const D: usize> Loads<'a, D> {
         }
         target.parts.each(target.detail, field, add);
     }
-}
-
-/// The cells that a body force acts on: those whose centroid its region holds.
-pub(crate) fn cells_of<const D: usize>(model: &Model<D>, region: &Region<D>) -> Vec<bool> {
-    let mesh = &model.mesh;
-    (0..mesh.cell_count())
-        .map(|c| region.contains(&mesh.centroid(c), 0.0))
-        .collect()
-}
-
-/// Whether any of the facets may belong to a cell that holds points: all of its nodes do. To find the cells themselves takes all facets of the mesh.
-pub(crate) fn may_bound_zone<const D: usize>(model: &Model<D>, facets: &[Facet]) -> bool {
-    let at_zone = |facet: &Facet| {
-        let corners = facet_corners::<D>(facet);
-        corners.iter().all(|&n| model.touches_points(n))
-    };
-    facets.iter().any(at_zone)
-}
-
-/// Facets of finite elements, and those of cells that hold points.
-pub(crate) fn split_facets<const D: usize>(
-    model: &Model<D>,
-    facets: &[Facet],
-) -> (Vec<Facet>, Vec<BoundaryFacet>) {
-    if !may_bound_zone(model, facets) {
-        return (model.mesh.present_facets(facets.to_vec()), Vec::new());
-    }
-    // a facet without a cell is an element's as far as anybody knows
-    let Ok(located) = model.mesh.locate_facets(facets) else {
-        return (facets.to_vec(), Vec::new());
-    };
-    let (own, zone): (Vec<_>, Vec<_>) = located
-        .into_iter()
-        .partition(|f| model.is_element(f.cell as usize));
-    (own.into_iter().map(|f| f.nodes).collect(), zone)
 }
 
 /// The applied force of each dof at time `t`, and that of each condition.

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use crate::coupling::{Model, Sampler};
 use crate::observe::summary::SectionForce;
 use crate::run::error::RunError;
-use crate::run::loads::{cells_of, holders};
+use crate::run::loads::holders;
 use crate::run::setup::RunSettings;
 use crate::scene::conditions::{Condition, Support};
 use crate::scene::load::Domain;
@@ -382,7 +382,7 @@ fn points_beyond<const D: usize>(
             }
         }
         Domain::Cells(region) => {
-            let inside = cells_of(model, region);
+            let inside = region.select_cells(mesh);
             let voids = model.peridynamics.as_ref().map_or(&[][..], |p| &p.voids);
             for c in (0..inside.len()).filter(|&c| inside[c]) {
                 beyond.cell_points(mesh, c, |x, w| {

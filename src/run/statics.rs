@@ -94,7 +94,7 @@ fn solve_over<const D: usize>(
             .take()
             .filter(|_| scene.elements == ElementsSpec::Linear)
             // whose stiffness has the springs in it, and is not that of the body
-            .filter(|k| k.equilibrium.springs.is_empty());
+            .filter(|k| k.equilibrium.terms.is_empty());
         solve_chosen(scene, kept, ranks, progress, &mut *visit)
     })
 }
@@ -444,7 +444,7 @@ impl<const D: usize> StaticBody<'_, D> {
             })
             .chain(
                 equilibrium
-                    .springs
+                    .terms
                     .reactions::<D>(&equilibrium.solution.displacement),
             )
             .collect()

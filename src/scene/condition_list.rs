@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::condition_kinds::ConditionSpec;
-use super::conditions::{Condition, Prescribed, Support};
+use super::conditions::{Condition, ConditionTerm, Prescribed, Support};
 use super::error::{SceneError, SceneErrorKind, Span};
 use super::solve::{Clock, Pacing};
 use super::value::Text;
@@ -18,13 +18,22 @@ pub(crate) fn conditions<const D: usize>(
 ) -> Result<Vec<Condition<D>>, SceneError> {
     let mut found = Vec::with_capacity(spec.len());
     for (name, condition) in spec {
-        found.push(condition.build(name, mesh, clock)?);
+        let built = condition.build(name, mesh, clock)?;
+        let rests = |term: &dyn ConditionTerm<D>| term.holds_at_rest();
+        if clock.pacing == Pacing::Still && !built.term().is_none_or(rests) {
+            return Err(SceneError::new(
+                SceneErrorKind::Conflict,
+                format!("`conditions.{name}` in a static scene"),
+            )
+            .label(name.span.clone(), "is not linear in the displacement")
+            .help("add [solve.quasi-static] with steps = 1, or [solve.explicit]"));
+        }
+        found.push(built);
     }
-    let holds = |c: &Condition<D>| {
-        matches!(
-            c.prescribed,
-            Prescribed::Displacement(_) | Prescribed::Spring(_)
-        )
+    let holds = |c: &Condition<D>| match &c.prescribed {
+        Prescribed::Displacement(_) => true,
+        Prescribed::Term(term) => term.holds_at_rest(),
+        Prescribed::Velocity(_) | Prescribed::Field(_) | Prescribed::Load(_) => false,
     };
     if clock.pacing != Pacing::Moving && !found.iter().any(holds) {
         return Err(SceneError::new(

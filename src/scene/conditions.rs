@@ -5,9 +5,8 @@ use std::sync::Arc;
 pub use super::components::Components;
 use super::load::{Domain, Load};
 pub use super::places::Support;
-use super::region::Region;
-use crate::mesh::Facet;
-use crate::mesh::boundary::BoundaryFacet;
+use crate::coupling::Model;
+use crate::system::ForceTerm;
 use crate::tensor::Vector;
 
 /// A displacement given by a function: another solution, say. A program sets it; a scene file has expressions.
@@ -41,7 +40,7 @@ impl<const D: usize> PartialEq for Field<D> {
 }
 
 /// What is prescribed.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub enum Prescribed<const D: usize> {
     /// Displacement.
     Displacement(Support<D>),
@@ -51,34 +50,40 @@ pub enum Prescribed<const D: usize> {
     Field(Field<D>),
     /// A load, of which the components are the values.
     Load(Load<D>),
-    /// Springs to the ground; the components of the condition are not used.
-    Spring(Bedding<D>),
+    /// A force that depends on the displacement; the components of the condition are not used.
+    Term(Arc<dyn ConditionTerm<D>>),
 }
 
-/// What springs hold, and how stiff they are.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Bedding<const D: usize> {
-    /// Facets.
-    Axes {
-        /// The facets.
-        facets: Vec<Facet>,
-        /// Force per area and displacement along each axis \[N/m³\].
-        stiffness: Vector<D>,
-    },
-    /// Facets at the boundary of the mesh, along their normals.
-    Normal {
-        /// The facets.
-        facets: Vec<BoundaryFacet>,
-        /// Force per area and displacement \[N/m³\].
-        stiffness: f64,
-    },
-    /// Cells whose centroid lies in a region.
-    Inside {
-        /// The region.
-        region: Region<D>,
-        /// Force per volume and displacement along each axis \[N/m⁴\].
-        stiffness: Vector<D>,
-    },
+impl<const D: usize> PartialEq for Prescribed<D> {
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Displacement(a), Self::Displacement(b)) => a == b,
+            (Self::Velocity(a), Self::Velocity(b)) => a == b,
+            (Self::Field(a), Self::Field(b)) => a == b,
+            (Self::Load(a), Self::Load(b)) => a == b,
+            (Self::Term(a), Self::Term(b)) => Arc::ptr_eq(a, b),
+            (
+                Self::Displacement(_)
+                | Self::Velocity(_)
+                | Self::Field(_)
+                | Self::Load(_)
+                | Self::Term(_),
+                _,
+            ) => false,
+        }
+    }
+}
+
+/// A force of a condition that depends on the displacement.
+pub trait ConditionTerm<const D: usize>: std::fmt::Debug + Send + Sync {
+    /// The nodes of each facet that it acts on.
+    fn facets(&self) -> Vec<&[u32]>;
+
+    /// Whether it is linear in the displacement and stores what it takes, so that it may hold a body at rest.
+    fn holds_at_rest(&self) -> bool;
+
+    /// The term on the sites of a model; none if it meets none.
+    fn on_model(&self, model: &Model<D>) -> Option<Arc<dyn ForceTerm>>;
 }
 
 impl<const D: usize> Condition<D> {
@@ -86,7 +91,7 @@ impl<const D: usize> Condition<D> {
     pub fn support(&self) -> Option<&Support<D>> {
         match &self.prescribed {
             Prescribed::Displacement(support) | Prescribed::Velocity(support) => Some(support),
-            Prescribed::Field(_) | Prescribed::Load(_) | Prescribed::Spring(_) => None,
+            Prescribed::Field(_) | Prescribed::Load(_) | Prescribed::Term(_) => None,
         }
     }
 
@@ -97,14 +102,14 @@ impl<const D: usize> Condition<D> {
             Prescribed::Displacement(_)
             | Prescribed::Velocity(_)
             | Prescribed::Field(_)
-            | Prescribed::Spring(_) => None,
+            | Prescribed::Term(_) => None,
         }
     }
 
-    /// The springs, if the condition is some.
-    pub fn springs(&self) -> Option<&Bedding<D>> {
+    /// The force that depends on the displacement, if the condition is one.
+    pub fn term(&self) -> Option<&dyn ConditionTerm<D>> {
         match &self.prescribed {
-            Prescribed::Spring(bedding) => Some(bedding),
+            Prescribed::Term(term) => Some(term.as_ref()),
             Prescribed::Displacement(_)
             | Prescribed::Velocity(_)
             | Prescribed::Field(_)
@@ -116,7 +121,7 @@ impl<const D: usize> Condition<D> {
     pub fn holds(&self) -> bool {
         match &self.prescribed {
             Prescribed::Displacement(_) | Prescribed::Velocity(_) | Prescribed::Field(_) => true,
-            Prescribed::Load(_) | Prescribed::Spring(_) => false,
+            Prescribed::Load(_) | Prescribed::Term(_) => false,
         }
     }
 

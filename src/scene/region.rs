@@ -60,6 +60,13 @@ impl<const D: usize> Region<D> {
         }
     }
 
+    /// The cells whose centroid the region holds; one entry per cell.
+    pub fn select_cells(&self, mesh: &Mesh<D>) -> Vec<bool> {
+        (0..mesh.cell_count())
+            .map(|c| self.contains(&mesh.centroid(c), 0.0))
+            .collect()
+    }
+
     /// The nodes in the region, those of the cells of a set among them; one entry per node.
     pub fn select_nodes(&self, mesh: &Mesh<D>) -> Vec<bool> {
         match self {

@@ -38,6 +38,24 @@ impl SpringRows {
         own
     }
 
+    /// The sum of several.
+    pub fn sum<'s>(block: usize, all: impl Iterator<Item = &'s Self>) -> Self {
+        let mut blocks: BTreeMap<(u32, u32), Vec<f64>> = BTreeMap::new();
+        for own in all {
+            own.each(|row, columns, values| {
+                for (&column, block) in columns.iter().zip(values.chunks_exact(block * block)) {
+                    let sum = blocks.entry((row, column));
+                    let sum = sum.or_insert_with(|| vec![0.0; block.len()]);
+                    sum.iter_mut().zip(block).for_each(|(sum, b)| *sum += b);
+                }
+            });
+        }
+        match blocks.is_empty() {
+            true => Self::default(),
+            false => Self::from_blocks(block, &blocks),
+        }
+    }
+
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.sites.is_empty()
@@ -137,12 +155,12 @@ impl SpringRows {
     }
 }
 
-impl ForceTerm for &SpringRows {
+impl ForceTerm for SpringRows {
     fn own_masses(&self) -> Vec<f64> {
         Vec::new()
     }
 
-    fn add_force(&mut self, u: &[f64], force: &mut [f64], _interval: Interval) {
+    fn add_force(&self, u: &[f64], force: &mut [f64], _interval: Interval) {
         self.add_product(u, force);
     }
 
@@ -170,7 +188,7 @@ impl ForceTerm for &SpringRows {
         SpringRows::energy(self, u)
     }
 
-    fn commit(&mut self) {}
+    fn commit(&self, _u: &[f64], _interval: Interval) {}
 
     fn dissipated(&self) -> Option<f64> {
         None
@@ -180,7 +198,7 @@ impl ForceTerm for &SpringRows {
         Vec::new()
     }
 
-    fn restore(&mut self, state: &[u64]) -> bool {
+    fn restore(&self, state: &[u64]) -> bool {
         state.is_empty()
     }
 }

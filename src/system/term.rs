@@ -14,13 +14,14 @@ pub struct RateBounds {
 /// One term of the sum: springs to the ground, impactors, dashpots, loads that follow the body. It knows its own places, and neither the body nor other terms.
 ///
 /// Shapes: `u`, `force` and `sums` have the unknowns of all sites, those of the body first and then the term's own. Every method is required: a term that leaves a force, an energy or a bound out
-/// says so.
+/// says so. A term that remembers keeps what it remembers behind a lock: the run and its records share it.
 pub trait ForceTerm: Send + Sync {
     /// Masses \[kg\] of the sites that the term has beside those of the body; empty for a term on the body alone. At most one term of a system has some.
     fn own_masses(&self) -> Vec<f64>;
 
-    /// Adds its force at the displacement `u` that ends an interval to `force` \[N\], in the sense of an internal force.
-    fn add_force(&mut self, u: &[f64], force: &mut [f64], interval: Interval);
+    /// Adds its force at the displacement `u` that ends an interval to `force` \[N\], in the sense of an internal force. An interval of length zero is the instant of the last
+    /// [`ForceTerm::commit`]: velocities are those of then.
+    fn add_force(&self, u: &[f64], force: &mut [f64], interval: Interval);
 
     /// Its tangent at rest; none if it vanishes there.
     fn rows(&self) -> Option<&SpringRows>;
@@ -40,8 +41,8 @@ pub trait ForceTerm: Send + Sync {
     /// The energy that it stores \[J\].
     fn energy(&self, u: &[f64]) -> f64;
 
-    /// Ends the interval at the displacement of the last [`ForceTerm::add_force`].
-    fn commit(&mut self);
+    /// Ends an interval at the displacement `u`.
+    fn commit(&self, u: &[f64], interval: Interval);
 
     /// The energy that it has dissipated up to the last [`ForceTerm::commit`] \[J\]; none for a term that never does.
     fn dissipated(&self) -> Option<f64>;
@@ -50,5 +51,5 @@ pub trait ForceTerm: Send + Sync {
     fn state(&self) -> Vec<u64>;
 
     /// Puts back what [`ForceTerm::state`] gave; false if it belongs to another term.
-    fn restore(&mut self, state: &[u64]) -> bool;
+    fn restore(&self, state: &[u64]) -> bool;
 }

@@ -1,6 +1,7 @@
 //! A body and the force terms beside it as one system.
 
 use std::ops::DerefMut;
+use std::sync::Arc;
 
 use super::wrapped::body_of;
 use super::{
@@ -11,10 +12,12 @@ use super::{
 /// `F_body(u) + Σ F_k(u)`: the sites of the body first, after them those that a term has of its own.
 pub struct WithTerms<'t, S> {
     body: S,
-    terms: Vec<Box<dyn ForceTerm + 't>>,
+    terms: Vec<Arc<dyn ForceTerm + 't>>,
     mass: Vec<f64>,
     /// Unknowns of the body.
     dofs: usize,
+    /// Where the last force was asked for, of terms that remember.
+    last: Option<(Vec<f64>, Interval)>,
 }
 
 impl<'t, S> WithTerms<'t, S>
@@ -23,11 +26,14 @@ where
     S::Target: SemiDiscrete,
 {
     /// A body, and what acts beside it.
-    pub fn new(body: S, terms: Vec<Box<dyn ForceTerm + 't>>) -> Self {
+    pub fn new(body: S, terms: Vec<Arc<dyn ForceTerm + 't>>) -> Self {
         let own = terms.iter().flat_map(|term| term.own_masses());
         Self {
             mass: body.mass().iter().copied().chain(own).collect(),
             dofs: body.mass().len() * body.block(),
+            last: (terms.iter())
+                .any(|term| term.dissipated().is_some() || !term.state().is_empty())
+                .then(|| (Vec::new(), Interval::AT_ONCE)),
             body,
             terms,
         }
@@ -38,8 +44,8 @@ where
         &all[..self.dofs]
     }
 
-    fn add_terms(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {
-        for term in &mut self.terms {
+    fn add_terms(&self, u: &[f64], force: &mut [f64], interval: Interval) {
+        for term in &self.terms {
             term.add_force(u, force, interval);
         }
     }
@@ -79,12 +85,19 @@ where
         let on_body = &u[..self.dofs];
         let broken = (self.body).internal_force_into(on_body, own, interval, breakage);
         self.add_terms(u, force, interval);
+        if let Some((at, of)) = &mut self.last {
+            at.clear();
+            at.extend_from_slice(u);
+            *of = interval;
+        }
         broken
     }
 
     fn commit(&mut self) {
         self.body.commit();
-        self.terms.iter_mut().for_each(|term| term.commit());
+        if let Some((u, interval)) = self.last.as_ref().filter(|(u, _)| !u.is_empty()) {
+            self.terms.iter().for_each(|term| term.commit(u, *interval));
+        }
     }
 
     fn force_of_heating_into(
@@ -130,7 +143,7 @@ where
         // own sites are no nodes; what is not linear is differenced
         let end = found.excess.columns.len();
         found.excess.row_offsets.resize(self.mass.len() + 1, end);
-        let is_linear = |t: &Box<dyn ForceTerm + '_>| t.difference_length().is_none();
+        let is_linear = |t: &Arc<dyn ForceTerm + '_>| t.difference_length().is_none();
         found.is_whole &= self.terms.iter().all(is_linear);
         Some(found)
     }
@@ -249,7 +262,7 @@ where
         };
         let (body, mut rest) = state.split_at(of_body);
         let mut fits = self.body.restore_damage(body);
-        for (term, length) in self.terms.iter_mut().zip(lengths) {
+        for (term, length) in self.terms.iter().zip(lengths) {
             let (own, others) = rest.split_at(length);
             fits &= term.restore(own);
             rest = others;

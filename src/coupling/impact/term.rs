@@ -2,20 +2,18 @@
 //!
 //! At rest nothing touches: the tangent is that of the body, and contact enters the stable step by its bound of frequencies.
 
-use std::sync::Arc;
-
 use super::Impact;
 use crate::system::{ForceTerm, Interval, RateBounds, SpringRows};
 
 /// The displacement over which forces are differenced, over the size of the smallest site.
 const DIFFERENCED: f64 = 1e-7;
 
-impl<const D: usize> ForceTerm for Arc<Impact<D>> {
+impl<const D: usize> ForceTerm for Impact<D> {
     fn own_masses(&self) -> Vec<f64> {
         self.masses().collect()
     }
 
-    fn add_force(&mut self, u: &[f64], force: &mut [f64], _interval: Interval) {
+    fn add_force(&self, u: &[f64], force: &mut [f64], _interval: Interval) {
         Impact::add_force(self, u, force);
     }
 
@@ -46,7 +44,7 @@ impl<const D: usize> ForceTerm for Arc<Impact<D>> {
         Impact::energy(self, u)
     }
 
-    fn commit(&mut self) {}
+    fn commit(&self, _u: &[f64], _interval: Interval) {}
 
     fn dissipated(&self) -> Option<f64> {
         None
@@ -56,7 +54,7 @@ impl<const D: usize> ForceTerm for Arc<Impact<D>> {
         Vec::new()
     }
 
-    fn restore(&mut self, state: &[u64]) -> bool {
+    fn restore(&self, state: &[u64]) -> bool {
         state.is_empty()
     }
 }

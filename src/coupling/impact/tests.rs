@@ -223,7 +223,7 @@ fn the_frequency_bound_holds_and_is_not_far_off() {
         mass: (0..60).map(|k| 0.5 + 0.01 * f64::from(k)).collect(),
         symmetry: Symmetry::Symmetric,
     };
-    let mut system = WithTerms::new(Box::new(body), vec![Box::new(Arc::new(contact))]);
+    let mut system = WithTerms::new(Box::new(body), vec![Arc::new(contact) as _]);
     let bound = system.contact_frequency_bound();
     let found = largest_eigenvalue(&mut system, &[0.0; 61 * 3]);
     assert!(found <= bound, "{found} {bound}");

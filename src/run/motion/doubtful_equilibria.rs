@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::setup::ModelSetup;
 use crate::coupling::Model;
 use crate::run::balance::{Balance, furthest, round_off};
+use crate::run::condition_terms::ConditionTerms;
 use crate::run::setup::RunSettings;
-use crate::run::springs::Springs;
 use crate::run::surface_gradient::{Asked, steep_stresses};
 use crate::run::warnings::{Imbalance, out_of_balance};
 use crate::scene::spec::CouplingTraits;
@@ -18,7 +18,7 @@ pub(super) struct DoubtfulEquilibria<'a, const D: usize> {
     model: &'a Model<D>,
     rest: &'a RunSettings<D>,
     traits: CouplingTraits,
-    springs: Arc<Springs>,
+    terms: Arc<ConditionTerms>,
     /// The stress error of a uniform field at surfaces of points.
     uniform: f64,
     /// The largest sum of internal forces \[N\], and the largest scale of forces; not those of one load step, since little holds a body that is unloaded.
@@ -39,7 +39,7 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
             model,
             rest: setup.rest,
             traits: setup.traits,
-            springs: Arc::clone(&setup.springs),
+            terms: Arc::clone(&setup.terms),
             uniform: setup.proof.largest("stress error"),
             force: Vector::zeros(),
             scale: 0.0,
@@ -53,7 +53,7 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
     pub fn watch(&mut self, seen: &LoadStep<'_>) {
         let u = &seen.state.u;
         let mut internal = seen.force.to_vec();
-        self.springs.take_from(&mut internal, u);
+        self.terms.take_from(&mut internal, u);
         let reactions: Vec<f64> = (seen.force.iter().zip(seen.load))
             .map(|(f, load)| f - load)
             .collect();

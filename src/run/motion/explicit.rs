@@ -214,7 +214,7 @@ fn take_segment<'r, const D: usize>(
         rest,
         spec,
         moving: laid_out.moving,
-        springs: laid_out.springs,
+        terms: laid_out.terms,
         remedy: record.remedy,
         proved,
         choices: &mut record.choices,

@@ -65,7 +65,7 @@ pub(crate) fn impacted<'a, const D: usize>(
         bytes: moving.bytes + impact.memory_bytes(),
         system: Box::new(WithTerms::new(
             moving.system,
-            vec![Box::new(Arc::clone(&impact))],
+            vec![Arc::clone(&impact) as _],
         )),
         is_linear: false,
         has_exact_seam: moving.has_exact_seam,

@@ -19,12 +19,12 @@ use crate::coupling::{BrokenBonds, Model, Operator, Sampler};
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::proof::Part;
 use crate::observe::summary::{Decision, Stopwatch, Timings, bytes_text};
+use crate::run::condition_terms::ConditionTerms;
 use crate::run::error::RunError;
 use crate::run::loads::BodyForces;
 use crate::run::motion::seen::Seen;
 use crate::run::proof::growth::{GrowthQuestion, free_start};
 use crate::run::setup::RunSettings;
-use crate::run::springs::Springs;
 use crate::scene::solve::Explicit as Spec;
 use crate::solve::explicit::State;
 use crate::system::Dissipation;
@@ -80,7 +80,7 @@ pub(crate) struct PreStep<'a, 'r, 'm, const D: usize> {
     pub spec: &'a Spec,
     pub moving: DynamicSystem<'m>,
     /// What springs hold the body.
-    pub springs: Arc<Springs>,
+    pub terms: Arc<ConditionTerms>,
     /// What to do about modes that grow.
     pub remedy: &'static str,
     /// What shows that none does, if anything does.
@@ -152,7 +152,7 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
             written,
         )?;
         recorder.hold(drive.holders());
-        recorder.cut(model, rest, self.springs)?;
+        recorder.cut(model, rest, self.terms)?;
         let resumed = saved.is_some();
         let edge = saved.as_ref().and_then(|s| s.edge);
         let (state, zone, seen) = match saved {
@@ -213,7 +213,7 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         let (state, switch) = leaving.arrive(model, system, &drive)?;
         recorder.move_to(&Sampler::new(model));
         recorder.hold(drive.holders());
-        recorder.cut(model, rest, self.springs)?;
+        recorder.cut(model, rest, self.terms)?;
         recorder.energy_at_start += switch.left();
         self.watch.lap(self.timings, "state carried over");
         let own = std::mem::replace(self.timings, before);

@@ -3,9 +3,9 @@
 use crate::coupling::{Model, Operator};
 use crate::observe::summary::Decision;
 use crate::progress::Progress;
+use crate::run::condition_terms::ConditionTerms;
 use crate::run::error::RunError;
 use crate::run::setup::RunSettings;
-use crate::run::springs::Springs;
 use crate::run::{equilibrium, loads};
 use crate::solve::FreeDofs;
 use crate::solve::direct::{DirectInfo, Factor};
@@ -21,11 +21,11 @@ pub(super) const RAISED: f64 = 1e-10;
 
 /// The stiffness before bonds break, with its diagonal raised.
 fn raised<const D: usize>(
-    (model, operator, springs): (&Model<D>, &dyn Operator<D>, &Springs),
+    (model, operator, terms): (&Model<D>, &dyn Operator<D>, &ConditionTerms),
     progress: &dyn Progress,
 ) -> BlockCsr {
     let mut stiffness = model.assemble(operator, progress);
-    springs.all.add_to(&mut stiffness);
+    terms.rows.add_to(&mut stiffness);
     stiffness.raise_diagonal(RAISED);
     stiffness
 }
@@ -43,7 +43,7 @@ impl CoarsenedStiffness {
     /// # Errors
     /// [`RunError`] for supports that meet no site.
     pub fn new<const D: usize>(
-        body: (&Model<D>, &dyn Operator<D>, &Springs),
+        body: (&Model<D>, &dyn Operator<D>, &ConditionTerms),
         symmetry: Symmetry,
         rest: &RunSettings<D>,
         choices: &mut Vec<Decision>,
@@ -89,7 +89,7 @@ impl NewtonFactors {
     /// # Errors
     /// [`RunError`] for supports that meet no site, and for factors that are asked for and do not fit.
     pub fn new<const D: usize>(
-        (model, operator, springs): (&Model<D>, &dyn Operator<D>, &Springs),
+        (model, operator, terms): (&Model<D>, &dyn Operator<D>, &ConditionTerms),
         symmetry: Symmetry,
         rest: &RunSettings<D>,
         choices: &mut Vec<Decision>,
@@ -101,7 +101,7 @@ impl NewtonFactors {
         }
         let (prescribed, _) = loads::supports(model, &rest.conditions, 0.0)?;
         let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
-        let stiffness = raised((model, operator, springs), progress);
+        let stiffness = raised((model, operator, terms), progress);
         let problem = StaticProblem {
             stiffness: &stiffness,
             symmetry,

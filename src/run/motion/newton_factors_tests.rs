@@ -44,7 +44,7 @@ impl Look for Solve {
 
     fn at<const D: usize>(&self, laid: ModelSetup<'_, D>) -> Result<Self::Found, RunError> {
         let (model, rest, mut system) = (laid.model, laid.rest, laid.moving.system);
-        let body = (model, laid.operator, laid.springs.as_ref());
+        let body = (model, laid.operator, laid.terms.as_ref());
         let near = NewtonFactors::new(body, system.symmetry(), rest, &mut Vec::new(), &Silent)?;
         let near = near.expect("small enough to factorise");
         let refactor = near.of_present_tangents().expect("nonlinear elements");

@@ -94,7 +94,7 @@ fn load_steps<const D: usize>(
     let (moving, impact) = impacted(model, rest, laid_out.moving, &begin, 1.0, &mut choices)?;
     let (mut system, is_linear) = (moving.system, moving.is_linear);
     let (pace, params) = (step_choice(spec), equilibrium_params(spec, &mut choices));
-    let body = (model, operator, laid_out.springs.as_ref());
+    let body = (model, operator, laid_out.terms.as_ref());
     let how = (system.symmetry(), params.equilibrium);
     let leads = Leads::new(body, how, (rest, options.ranks), &mut choices, progress)?;
     let made = leads.made(progress)?;
@@ -107,7 +107,7 @@ fn load_steps<const D: usize>(
     let breaks = breaks(system.as_ref(), rest);
     let mut recorder = recorder((model, rest), spec, options, (impact, breaks), file, at)?;
     recorder.hold(drive.holders());
-    recorder.cut(model, rest, Arc::clone(&laid_out.springs))?;
+    recorder.cut(model, rest, Arc::clone(&laid_out.terms))?;
     let (edge, seen) = at.map_or_else(Default::default, |s| (s.edge, s.seen.clone()));
     let (state, mut loaded) = first_state(begin, saved);
     let first = state.step;

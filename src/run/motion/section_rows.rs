@@ -2,10 +2,10 @@
 
 use crate::coupling::Model;
 use crate::observe::summary::SectionForce;
+use crate::run::condition_terms::ConditionTerms;
 use crate::run::error::RunError;
 use crate::run::sections::{self, Sections};
 use crate::run::setup::RunSettings;
-use crate::run::springs::Springs;
 use crate::scene::section::Section;
 
 /// The sections of a scene, and their forces at the last row.
@@ -48,7 +48,7 @@ impl<'a, const D: usize> SectionRows<'a, D> {
     pub fn row<'h>(
         &mut self,
         (internal, external): (&[f64], &[f64]),
-        springs: Option<&Springs>,
+        terms: Option<&ConditionTerms>,
         held: impl Iterator<Item = (u32, &'h f64)>,
         (u, t): (&[f64], f64),
     ) -> Vec<f64> {
@@ -60,8 +60,8 @@ impl<'a, const D: usize> SectionRows<'a, D> {
         for (dof, load) in held {
             excess[dof as usize] = internal[dof as usize] - load;
         }
-        if let Some(springs) = springs {
-            springs.take_from(&mut excess, u);
+        if let Some(terms) = terms {
+            terms.take_from(&mut excess, u);
         }
         self.last = found.forces(&excess, u, t);
         let forces = self.last.iter();

@@ -11,10 +11,10 @@ use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found};
 use crate::observe::proof::Proof;
 use crate::observe::summary::{Decision, Stopwatch, Timings, resident_memory_bytes};
 use crate::progress::Progress;
+use crate::run::condition_terms::ConditionTerms;
 use crate::run::error::RunError;
 use crate::run::proof::{self, Subject, growth};
 use crate::run::setup::{self, RunSettings};
-use crate::run::springs::Springs;
 use crate::scene::spec::CouplingTraits;
 use crate::scene::validated::Scene;
 use crate::system::{Ranks, SemiDiscrete, WithTerms};
@@ -38,7 +38,7 @@ pub struct ModelSetup<'a, const D: usize> {
     /// The system that solvers see.
     pub moving: DynamicSystem<'a>,
     /// What springs hold the body; the system has them.
-    pub(crate) springs: Arc<Springs>,
+    pub(crate) terms: Arc<ConditionTerms>,
     /// What the program chose where the scene leaves it open.
     pub choices: Vec<Decision>,
     /// What was shown about the model.
@@ -106,7 +106,7 @@ pub(crate) fn lay_out<const D: usize, T>(
     watch.lap(&mut timings, "sites and bonds");
     let bytes = resident_memory_bytes().unwrap_or(0);
     let operator = coupling.operator(&model)?;
-    let springs = Arc::new(Springs::new(&model, &rest.conditions)?);
+    let terms = Arc::new(ConditionTerms::new(&model, &rest.conditions)?);
     let mut moving = dynamic(
         &model,
         coupling.as_ref(),
@@ -135,8 +135,8 @@ pub(crate) fn lay_out<const D: usize, T>(
     )?;
     proof::hold(&proof)?;
     watch.lap(&mut timings, "proof");
-    if !springs.is_empty() {
-        moving.system = Box::new(WithTerms::new(moving.system, vec![Box::new(&springs.all)]));
+    if !terms.is_empty() {
+        moving.system = Box::new(WithTerms::new(moving.system, terms.all()));
     }
     let done = then(ModelSetup {
         title,
@@ -147,7 +147,7 @@ pub(crate) fn lay_out<const D: usize, T>(
         operator: operator.as_ref(),
         rest,
         moving,
-        springs: Arc::clone(&springs),
+        terms: Arc::clone(&terms),
         choices,
         proof,
         bytes,

@@ -62,9 +62,7 @@ pub(crate) fn holders_at_rest<'a, const D: usize>(
 /// Whether a process then moves its own sites and their ghosts alone, and not all: no sub-steps, no springs, nothing that strikes.
 pub(crate) fn moves_own_sites<const D: usize>(spec: &Explicit, rest: &RunSettings<D>) -> bool {
     let mut conditions = rest.conditions.iter();
-    spec.sub_steps.is_none()
-        && rest.impactors.is_empty()
-        && conditions.all(|c| c.springs().is_none())
+    spec.sub_steps.is_none() && rest.impactors.is_empty() && conditions.all(|c| c.term().is_none())
 }
 
 /// Collective: what the processes of a run share; no more than any of them can, and nothing where somebody looks at each step.

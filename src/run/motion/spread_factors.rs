@@ -6,10 +6,10 @@ use super::newton_factors::{CoarsenedStiffness, NewtonFactors, RAISED};
 use crate::coupling::{Distribution, Model, Operator};
 use crate::observe::summary::{Decision, Stopwatch, Timings};
 use crate::progress::Progress;
+use crate::run::condition_terms::ConditionTerms;
 use crate::run::error::RunError;
 use crate::run::loads;
 use crate::run::setup::RunSettings;
-use crate::run::springs::Springs;
 use crate::solve::krylov::LinearMap;
 use crate::solve::quasi_static::{Equilibrium, TangentFactors};
 use crate::solve::statics::{Method, StaticError};
@@ -31,7 +31,7 @@ impl<'a> Leads<'a> {
     /// # Errors
     /// Those of [`NewtonFactors::new`] and [`SpreadStiffness::new`].
     pub fn new<const D: usize>(
-        (model, operator, springs): (&Model<D>, &dyn Operator<D>, &Springs),
+        (model, operator, terms): (&Model<D>, &dyn Operator<D>, &ConditionTerms),
         (symmetry, equilibrium): (Symmetry, Equilibrium),
         (rest, ranks): (&RunSettings<D>, Option<&'a dyn Ranks>),
         choices: &mut Vec<Decision>,
@@ -39,10 +39,10 @@ impl<'a> Leads<'a> {
     ) -> Result<Self, RunError> {
         let (mut own, mut spread, mut coarsened) = (None, None, None);
         if equilibrium == Equilibrium::Newton {
-            let body = (model, operator, &springs.all);
+            let body = (model, operator, &terms.rows);
             spread = SpreadStiffness::new(body, symmetry, rest, ranks, choices, progress)?;
             if spread.is_none() {
-                let body = (model, operator, springs);
+                let body = (model, operator, terms);
                 own = NewtonFactors::new(body, symmetry, rest, choices, progress)?;
                 coarsened = CoarsenedStiffness::new(body, symmetry, rest, choices, progress)?;
             }
@@ -107,7 +107,7 @@ impl<'a> SpreadStiffness<'a> {
     /// # Errors
     /// [`RunError`] for supports that meet no site.
     fn new<const D: usize>(
-        (model, operator, springs): (&Model<D>, &dyn Operator<D>, &SpringRows),
+        (model, operator, terms): (&Model<D>, &dyn Operator<D>, &SpringRows),
         symmetry: Symmetry,
         rest: &RunSettings<D>,
         ranks: Option<&'a dyn Ranks>,
@@ -121,8 +121,8 @@ impl<'a> SpreadStiffness<'a> {
         let Distribution { partition, why } = model.distribute(ranks.count(), false, Some(ranks));
         let own = partition.of(ranks.rank());
         let mut matrix = model.assemble_sites(operator, own, progress);
-        if !springs.is_empty() {
-            matrix = springs.added(&matrix, own);
+        if !terms.is_empty() {
+            matrix = terms.added(&matrix, own);
         }
         matrix.raise_diagonal_of(|row| own[row], RAISED);
         let (prescribed, _) = loads::supports(model, &rest.conditions, 0.0)?;

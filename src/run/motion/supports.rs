@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::observe::summary::Reaction;
-use crate::run::springs::Springs;
+use crate::run::condition_terms::ConditionTerms;
 use crate::scene::conditions::{Condition, Prescribed};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -14,11 +14,11 @@ pub(super) struct Supports<const D: usize> {
     /// Prescribed dofs with the condition that holds each, by its number among all conditions.
     holders: Vec<(u32, u32)>,
     /// The conditions that are springs, by their names.
-    spring_names: Vec<String>,
+    term_names: Vec<String>,
     /// What they hold; none before the model is known.
-    springs: Option<Arc<Springs>>,
+    terms: Option<Arc<ConditionTerms>>,
     /// Forces of the springs at the last row.
-    last_of_springs: Vec<Reaction>,
+    last_of_terms: Vec<Reaction>,
     /// Forces of the last row, `D` of each condition; empty before the first.
     last: Vec<f64>,
 }
@@ -42,15 +42,15 @@ impl<const D: usize> Supports<D> {
                 Prescribed::Displacement(_)
                 | Prescribed::Velocity(_)
                 | Prescribed::Load(_)
-                | Prescribed::Spring(_) => c.components.0[k].is_some(),
+                | Prescribed::Term(_) => c.components.0[k].is_some(),
             }),
         };
-        let springs = conditions.iter();
-        let springs = springs.filter(|c| c.springs().is_some());
+        let terms = conditions.iter();
+        let terms = terms.filter(|c| c.term().is_some());
         Self {
-            spring_names: springs.map(|c| c.name.clone()).collect(),
-            springs: None,
-            last_of_springs: Vec::new(),
+            term_names: terms.map(|c| c.name.clone()).collect(),
+            terms: None,
+            last_of_terms: Vec::new(),
             conditions: all.map(support).collect(),
             holders: Vec::new(),
             last: Vec::new(),
@@ -68,13 +68,13 @@ impl<const D: usize> Supports<D> {
     }
 
     /// Takes what springs hold the body.
-    pub fn spring(&mut self, springs: Arc<Springs>) {
-        self.springs = Some(springs);
+    pub fn take_terms(&mut self, terms: Arc<ConditionTerms>) {
+        self.terms = Some(terms);
     }
 
     /// What springs hold the body, if that is known.
-    pub fn springs(&self) -> Option<&Springs> {
-        self.springs.as_deref()
+    pub fn terms(&self) -> Option<&ConditionTerms> {
+        self.terms.as_deref()
     }
 
     /// The columns of a row: all reactions, then the displacements of what is prescribed, then the forces of springs.
@@ -87,8 +87,8 @@ impl<const D: usize> Supports<D> {
             let name = &self.conditions[c].name;
             format!("{name}_displacement_{}", AXES[k])
         }));
-        let springs = self.spring_names.iter();
-        header.extend(springs.flat_map(|name| {
+        let terms = self.term_names.iter();
+        header.extend(terms.flat_map(|name| {
             let axes = AXES[..D].iter();
             axes.map(move |a| format!("{name}_reaction_{a}"))
         }));
@@ -128,12 +128,12 @@ impl<const D: usize> Supports<D> {
             let (sum, count) = sums[c * D + k];
             if count > 0.0 { sum / count } else { 0.0 }
         }));
-        match &self.springs {
-            Some(springs) => self.last_of_springs = springs.reactions::<D>(u),
-            None => reactions.extend(vec![0.0; self.spring_names.len() * D]),
+        match &self.terms {
+            Some(terms) => self.last_of_terms = terms.reactions::<D>(u),
+            None => reactions.extend(vec![0.0; self.term_names.len() * D]),
         }
-        let springs = self.last_of_springs.iter();
-        reactions.extend(springs.flat_map(|r| r.force.iter().copied()));
+        let terms = self.last_of_terms.iter();
+        reactions.extend(terms.flat_map(|r| r.force.iter().copied()));
         reactions
     }
 
@@ -145,7 +145,7 @@ impl<const D: usize> Supports<D> {
             condition: support.name.clone(),
             force: force.to_vec(),
         })
-        .chain(self.last_of_springs.iter().cloned())
+        .chain(self.last_of_terms.iter().cloned())
         .collect()
     }
 }

@@ -21,12 +21,12 @@ use crate::observe::history::History;
 use crate::observe::pieces::agreed;
 use crate::observe::series::Series;
 use crate::observe::summary::{Reaction, SectionForce};
+use crate::run::condition_terms::ConditionTerms;
 use crate::run::error::RunError;
 use crate::run::motion::seen::Seen;
 use crate::run::pieces::Piece;
 use crate::run::setup::RunSettings;
 use crate::run::solution::Solved;
-use crate::run::springs::Springs;
 use crate::run::stress_probes;
 use crate::run::write::{ENERGY_DENSITY, OverSites, Shown, energy_densities, snapshot};
 use crate::scene::conditions::Condition;
@@ -182,10 +182,10 @@ impl<'a, const D: usize> Recorder<'a, D> {
         &mut self,
         model: &Model<D>,
         rest: &'a RunSettings<D>,
-        springs: Arc<Springs>,
+        terms: Arc<ConditionTerms>,
     ) -> Result<(), RunError> {
         self.sections.find(model, rest)?;
-        self.supports.spring(springs);
+        self.supports.take_terms(terms);
         Ok(())
     }
 
@@ -281,9 +281,9 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let supports = self.supports.row(moment.supports, &state.u);
         row.extend(supports.into_iter().map(Entry::from));
         let held = self.supports.dofs().zip(moment.supports.1);
-        let springs = self.supports.springs();
+        let terms = self.supports.terms();
         let at = (&state.u[..], state.time);
-        let sections = self.sections.row(moment.forces, springs, held, at);
+        let sections = self.sections.row(moment.forces, terms, held, at);
         row.extend(sections.into_iter().map(Entry::from));
         row.extend(probed.iter().map(|&s| Entry::from(s)));
         let impact = self

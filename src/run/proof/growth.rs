@@ -60,7 +60,7 @@ pub(crate) fn free_start<'a, const D: usize>(
 ) -> Result<Option<Pair<'a>>, RunError> {
     let is_still = |c: &Condition<D>| match &c.prescribed {
         Prescribed::Displacement(_) | Prescribed::Field(_) => !c.components.depends_on_time(),
-        Prescribed::Spring(_) => true,
+        Prescribed::Term(term) => term.holds_at_rest(),
         Prescribed::Velocity(_) | Prescribed::Load(_) => false,
     };
     let is_free = is_linear

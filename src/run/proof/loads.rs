@@ -5,6 +5,7 @@
 #![deny(clippy::wildcard_enum_match_arm)]
 
 use super::Subject;
+use crate::coupling::loaded_places::may_bound_zone;
 use crate::coupling::tributary::Moments;
 use crate::coupling::{CellRole, Model, Zone};
 use crate::fem;
@@ -13,9 +14,7 @@ use crate::mesh::boundary::BoundaryFacet;
 use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::observe::report::number;
 use crate::run::error::RunError;
-use crate::run::loads::{
-    BodyForces, Loads, cells_of, may_bound_zone, nearest_points, site_of_node,
-};
+use crate::run::loads::{BodyForces, Loads, nearest_points, site_of_node};
 use crate::scene::Expression;
 use crate::scene::conditions::{Condition, Support};
 use crate::scene::load::Domain;
@@ -149,7 +148,7 @@ fn exact<const D: usize>(
             }
         }
         Domain::Cells(region) => {
-            let inside = cells_of(model, region);
+            let inside = region.select_cells(mesh);
             for c in (0..inside.len()).filter(|&c| inside[c]) {
                 fem::for_each_point(mesh, c, fem::Rule::Mass, |p| {
                     add(&p.position, &none, p.weight, &mut found);
@@ -190,7 +189,7 @@ fn coarser<const D: usize>(
             }
         }
         Domain::Cells(region) => {
-            let inside = cells_of(model, region);
+            let inside = region.select_cells(mesh);
             for c in (0..inside.len()).filter(|&c| inside[c]) {
                 sum += field(&mesh.centroid(c), &none) * fem::cell_volume(mesh, c);
             }

@@ -7,7 +7,7 @@ use crate::coupling::tributary::{Detail, Parts};
 use crate::coupling::{Model, bin_of};
 use crate::mesh::boundary::BoundaryFacet;
 use crate::mesh::facet_corners;
-use crate::scene::conditions::{Bedding, Condition, Prescribed, Support};
+use crate::scene::conditions::{Condition, Prescribed, Support};
 use crate::shape::{Barrier, Barriers};
 use crate::tensor::{Tensor, Vector};
 
@@ -261,16 +261,10 @@ fn kinds<const D: usize>(
     for condition in conditions {
         let loaded: Vec<&[u32]> = match &condition.prescribed {
             Prescribed::Load(load) => load.on.facets(),
-            Prescribed::Spring(Bedding::Axes { facets, .. }) => {
-                facets.iter().map(AsRef::as_ref).collect()
+            Prescribed::Term(term) => term.facets(),
+            Prescribed::Displacement(_) | Prescribed::Velocity(_) | Prescribed::Field(_) => {
+                Vec::new()
             }
-            Prescribed::Spring(Bedding::Normal { facets, .. }) => {
-                facets.iter().map(|f| f.nodes.as_ref()).collect()
-            }
-            Prescribed::Spring(Bedding::Inside { .. })
-            | Prescribed::Displacement(_)
-            | Prescribed::Velocity(_)
-            | Prescribed::Field(_) => Vec::new(),
         };
         for nodes in loaded {
             if let Some(&f) = sorted.get(&key(nodes)) {

@@ -1,19 +1,32 @@
 //! Springs to the ground.
+//!
+//! By virtual work, as loads are: the displacement of each point of a quadrature is `Σ w u` of sites, and `½ ∫ k |u|²` is the energy of the springs. Their rows are therefore
+//! symmetric and never negative, whatever the weights; the force of a rigid motion is that of the integral.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::ConditionKind;
-use crate::mesh::Mesh;
+use crate::coupling::loaded_places::split_facets;
+use crate::coupling::tributary::{Detail, Parts};
+use crate::coupling::{CellRole, Model};
+use crate::fem;
+use crate::mesh::boundary::BoundaryFacet;
+use crate::mesh::{Facet, Mesh};
 use crate::scene::bounds_checks;
 use crate::scene::components::Components;
-use crate::scene::conditions::{Bedding, Condition, Prescribed};
+use crate::scene::conditions::{Condition, ConditionTerm, Prescribed};
 use crate::scene::error::{SceneError, SceneErrorKind};
 use crate::scene::places::{facet_set, inside, outer_facets};
+use crate::scene::region::Region;
 use crate::scene::solve::Clock;
 use crate::scene::spec::ShapeSpec;
 use crate::scene::value::{Number, Text};
-use crate::tensor::Vector;
+use crate::system::{ForceTerm, SpringRows};
+use crate::tensor::{Tensor, Vector};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -110,8 +123,132 @@ impl ConditionKind for SpringSpec {
         };
         Ok(Condition {
             name: name.value.clone(),
-            prescribed: Prescribed::Spring(bedding),
+            prescribed: Prescribed::Term(Arc::new(bedding)),
             components: Components(std::array::from_fn(|_| None)),
         })
     }
+}
+
+/// The places that springs hold, and their stiffness.
+#[derive(Clone, Debug, PartialEq)]
+enum Bedding<const D: usize> {
+    /// Facets.
+    Axes {
+        /// The facets.
+        facets: Vec<Facet>,
+        /// Force per area and displacement along each axis \[N/m³\].
+        stiffness: Vector<D>,
+    },
+    /// Facets at the boundary of the mesh, along their normals.
+    Normal {
+        /// The facets.
+        facets: Vec<BoundaryFacet>,
+        /// Force per area and displacement \[N/m³\].
+        stiffness: f64,
+    },
+    /// Cells whose centroid lies in a region.
+    Inside {
+        /// The region.
+        region: Region<D>,
+        /// Force per volume and displacement along each axis \[N/m⁴\].
+        stiffness: Vector<D>,
+    },
+}
+
+impl<const D: usize> ConditionTerm<D> for Bedding<D> {
+    fn facets(&self) -> Vec<&[u32]> {
+        match self {
+            Self::Axes { facets, .. } => facets.iter().map(AsRef::as_ref).collect(),
+            Self::Normal { facets, .. } => facets.iter().map(|f| f.nodes.as_ref()).collect(),
+            Self::Inside { .. } => Vec::new(),
+        }
+    }
+
+    fn holds_at_rest(&self) -> bool {
+        true
+    }
+
+    fn on_model(&self, model: &Model<D>) -> Option<Arc<dyn ForceTerm>> {
+        let own = blocks(model, self).0;
+        let rows = (!own.is_empty()).then(|| SpringRows::from_blocks(D, &own))?;
+        Some(Arc::new(rows))
+    }
+}
+
+/// Blocks of pairs of sites.
+#[derive(Default)]
+struct Blocks(BTreeMap<(u32, u32), Vec<f64>>);
+
+impl Blocks {
+    /// Adds springs of the stiffness `k` at a place that follows these sites.
+    fn add_place<const D: usize>(&mut self, follows: &[(u32, f64)], k: &Tensor<D>) {
+        for &(row, v) in follows.iter().filter(|(_, w)| *w != 0.0) {
+            for &(column, w) in follows.iter().filter(|(_, w)| *w != 0.0) {
+                let block: Vec<f64> = (0..D * D).map(|e| k[(e / D, e % D)] * (v * w)).collect();
+                let own = self.0.entry((row, column));
+                let own = own.or_insert_with(|| vec![0.0; block.len()]);
+                own.iter_mut().zip(block).for_each(|(own, b)| *own += b);
+            }
+        }
+    }
+}
+
+/// The springs of one condition.
+fn blocks<const D: usize>(model: &Model<D>, bedding: &Bedding<D>) -> Blocks {
+    let mesh = &model.mesh;
+    let mut blocks = Blocks::default();
+    let on_nodes = |nodes: &[u32], shape: &[f64]| -> Vec<(u32, f64)> {
+        let each = nodes.iter().zip(shape);
+        each.flat_map(|(&n, value)| {
+            let row = model.node_transfer.row(n as usize);
+            row.map(move |(site, w)| (site, w * value))
+        })
+        .collect()
+    };
+    match bedding {
+        Bedding::Axes { facets, stiffness } => {
+            let k = Tensor::from_diagonal(stiffness);
+            let (own, zone) = split_facets(model, facets);
+            for facet in own {
+                fem::facet_points(mesh, &facet, |p| {
+                    blocks.add_place(&on_nodes(&facet, &p.shape), &(k * p.weight));
+                });
+            }
+            let parts = Parts::of_facets(model, &zone, Detail::Quadrature);
+            parts.each_point(|_, weight, _, follows| blocks.add_place(follows, &(k * weight)));
+        }
+        Bedding::Normal { facets, stiffness } => {
+            let k = |n: &Vector<D>, weight: f64| n * n.transpose() * (stiffness * weight);
+            // with the nodes that its cell has in the model: cells at the seam are linear
+            let present = facets.iter().map(|f| mesh.facet((f.cell, f.local)));
+            let (own, zone): (Vec<_>, Vec<_>) =
+                present.partition(|f| model.is_element(f.cell as usize));
+            for facet in own {
+                fem::outward_points(mesh, &facet, |p| {
+                    let follows = on_nodes(&facet.nodes, &p.shape);
+                    blocks.add_place(&follows, &k(&p.normal, p.weight));
+                });
+            }
+            let parts = Parts::of_facets(model, &zone, Detail::Quadrature);
+            parts.each_point(|_, weight, n, follows| blocks.add_place(follows, &k(n, weight)));
+        }
+        Bedding::Inside { region, stiffness } => {
+            let k = Tensor::from_diagonal(stiffness);
+            let inside = region.select_cells(mesh);
+            for c in (0..inside.len()).filter(|&c| inside[c] && model.is_element(c)) {
+                fem::for_each_point(mesh, c, fem::Rule::Mass, |p| {
+                    let follows = on_nodes(mesh.cell(c), &p.shape);
+                    blocks.add_place(&follows, &(k * p.weight));
+                });
+            }
+            let zone: Vec<bool> = (0..inside.len())
+                .map(|c| inside[c] && model.roles[c] == CellRole::Points)
+                .collect();
+            if zone.contains(&true) {
+                let parts = Parts::of_cells(model, &zone, Detail::Quadrature);
+                parts.each_point(|_, weight, _, follows| blocks.add_place(follows, &(k * weight)));
+            }
+        }
+    }
+    blocks
 }
