@@ -113,6 +113,15 @@ fn rows(path: &Path) -> Vec<Vec<f64>> {
         .collect()
 }
 
+/// The columns of a CSV file by their names.
+fn table(path: &Path) -> BTreeMap<String, Vec<f64>> {
+    let text = fs::read_to_string(path).unwrap();
+    let header = text.lines().next().unwrap().split(',').map(str::to_owned);
+    let rows = rows(path);
+    let column = |(k, name): (usize, String)| (name, rows.iter().map(|row| row[k]).collect());
+    header.enumerate().map(column).collect()
+}
+
 /// What the program needs, without tests and suites, and the page of keys, which additions change too.
 fn packages(root: &Path) -> Files {
     let mut files = Files::new();
@@ -245,6 +254,22 @@ fn the_additions_of_the_page_build_and_run() {
     let corrected = (end(&[]) - exact).abs();
     let plain = (end(&["materials.bar={bond-based={youngs-modulus=1}}"]) - exact).abs();
     assert!(corrected < 0.5 * plain, "{corrected:e} against {plain:e}");
+
+    run("hydrostatic.toml", &[]);
+    let history = table(&copied.join("out/hydrostatic_history.csv"));
+    let thrust = *history["base_reaction_x"].last().unwrap();
+    assert!(
+        (thrust + 0.5 * 10.0 * 0.75f64.powi(2)).abs() < 1e-9,
+        "{thrust}"
+    );
+
+    run("dashpot.toml", &[]);
+    let history = table(&copied.join("out/dashpot_history.csv"));
+    let [first, last] = ["stored_energy", "dissipated_energy"].map(|name| &history[name]);
+    let (begun, left) = (first[0], first.last().unwrap());
+    let taken = last.last().unwrap();
+    assert!(*left < 1e-3 * begun, "{left} of {begun}");
+    assert!((taken / begun - 1.0).abs() < 0.01, "{taken} of {begun}");
 
     run("wedges.toml", &[]);
     let line = rows(&copied.join("out/wedges_inside.csv"));

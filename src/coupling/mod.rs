@@ -25,7 +25,8 @@
 //! | `cauchy_born.rs` | elements that follow the bonds of the points at any stretch | eq. (2.10) |
 //! | `tributary/` | the part of the body that each site stands for: its mass, and the loads on it | |
 //! | `semidiscrete.rs`, `semidiscrete/` | a model that moves: bonds that stretch and break beside the rows of the rest | |
-//! | `impact.rs`, `impact/` | rigid impactors that push the sites of a model that moves | |
+//! | `loaded_places.rs` | the elements and the cells of points that facets belong to | |
+//! | `impact.rs`, `impact/` | rigid impactors that push the sites of a model that moves, as a force term | |
 //! | `state_transfer.rs` | a motion handed from one layout of zones to another | |
 //! | `crate::assembly` | rows, and places expressed through sites | |
 //!

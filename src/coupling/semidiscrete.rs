@@ -135,11 +135,10 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
             let cloud = &body.cloud;
             seam.follow_motion(behaviour.kinematics);
             if let Some(critical) = &behaviour.failure {
-                let critical = |[i, j]: [u32; 2]| match critical {
-                    FailureCriterion::ByMaterials(stretch) => {
-                        stretch.at(cloud.material[i as usize], cloud.material[j as usize])
-                    }
-                    of_lattice => of_lattice.at(cloud.horizon.lattice_of(i as usize)),
+                let material = |p: u32| cloud.material.get(p as usize).copied().unwrap_or(0);
+                let critical = |[i, j]: [u32; 2]| {
+                    let lattice = cloud.horizon.lattice_of(i as usize);
+                    critical.at(lattice, [material(i), material(j)])
                 };
                 let never = |p: u32| (behaviour.no_fail)(&cloud.position[p as usize]);
                 seam.let_break(model, body, critical, never);

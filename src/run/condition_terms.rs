@@ -1,5 +1,7 @@
 //! Forces of a scene's conditions that depend on the displacement, on the sites of its model.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use std::sync::Arc;
 
 use crate::coupling::Model;

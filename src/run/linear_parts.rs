@@ -301,12 +301,8 @@ impl<'m, const D: usize> LinearParts<'m, D> {
             // s = (2ξ·η + η·η) / (|ξ| (|ξ+η| + |ξ|)); one of the two is wrong where the body turns
             let exact = (2.0 * xi.dot(&eta) + eta.norm_squared())
                 / (square + square.sqrt() * (xi + eta).norm());
-            let limit = match critical {
-                FailureCriterion::ByMaterials(of) => {
-                    of.at(self.material_at(i), self.material_at(j))
-                }
-                of_lattice => of_lattice.at(cloud.horizon.lattice_of(i)),
-            };
+            let materials = [self.material_at(i), self.material_at(j)];
+            let limit = critical.at(cloud.horizon.lattice_of(i), materials);
             (linear.min(exact) - free) / limit
         };
         let family = body.families.of(i).iter();

@@ -18,7 +18,7 @@
 //! | `linear.rs` | the model alone, for studies of stiffness, eigenvalues and waves |
 //! | `stresses.rs`, `stress_settings.rs`, `stress_probes.rs` | stress as outputs show it, and with each row of a history |
 //! | `thermal.rs` | the force on each site that a change of temperature gives |
-//! | `springs.rs` | springs between the body and the ground, on the sites of a model |
+//! | `condition_terms.rs` | forces of conditions that depend on the displacement, on the sites of a model |
 //! | `sections.rs` | force and moment that the part of the body beyond a plane exerts on the rest |
 //! | `balance.rs`, `rotation.rs`, `surface_gradient.rs`, `warnings.rs` | whether loads and reactions balance; how far elements rotate; stresses that families do not resolve; what of a model makes its results doubtful |
 //! | `linear_parts.rs` | elements, rows and bonds that are linear, or stay whole, beyond where their material is |

@@ -10,6 +10,8 @@
 //! the order of the displacement about those at rest. Linear forces have none about the places at rest. So a force acts where its site has moved to if that site's row is of the first kind, and else where the site
 //! was; loads likewise, on the sites around.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use std::collections::BTreeMap;
 
 use crate::coupling::{Model, Sampler};

@@ -71,9 +71,10 @@ fn supported<'a, const D: usize>(
             "add fracture-energy or critical-stretch to the material, or remove it",
         ));
     }
-    if let Some(Fracture::Tearing(_)) = breaking.fracture {
+    if !breaking.fracture.is_none_or(Fracture::is_of_stretch) {
         return Err(refused(
-            "`zones.follow` is set, and bonds break by a tearing parameter".to_owned(),
+            "`zones.follow` is set, and bonds break by something else than their stretch"
+                .to_owned(),
             "follows bonds that are stretched",
             "draw the nonlocal zone where the part may tear, or give a critical-stretch",
         ));

@@ -1,5 +1,7 @@
 //! All conditions of a scene together.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use std::collections::BTreeMap;
 
 use super::condition_kinds::ConditionSpec;

@@ -1,5 +1,7 @@
 //! Conditions of a validated scene.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use std::sync::Arc;
 
 pub use super::components::Components;

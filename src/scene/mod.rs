@@ -11,7 +11,9 @@
 //! | `draft.rs`, `validated.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
 //! | `meshing.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `materials.rs`, `material_interfaces.rs`, `peridynamics.rs`, `default_points.rs`, `default_horizon.rs`, `points.rs`, `cracks_and_voids.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs`, `section.rs` | its parts |
 //! | `coupling_selection.rs`, `selected_coupling.rs` | the coupling that is typed, or the one that suits the scene |
-//! | `condition_list.rs`, `conditions.rs`, `surface_conditions.rs` | the conditions that are typed; each of them; those that depend on geometry: pressure, symmetry, rotation |
+//! | `condition_kinds/` | the conditions that are typed, one file each: loads, supports, springs |
+//! | `conditions.rs`, `load.rs`, `condition_list.rs` | a condition; a load, where it acts and its density; all conditions together |
+//! | `components.rs`, `places.rs` | vector fields, and the sets and shapes that conditions name |
 //! | `temperature.rs` | the temperature of the body |
 //! | `impactors.rs` | rigid bodies that strike or press |
 //! | `user_material.rs` | materials of a user's routine |

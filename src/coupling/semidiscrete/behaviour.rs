@@ -1,5 +1,7 @@
 //! How the bonds of a moving model deform and break.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use std::sync::Arc;
 
 use crate::{
@@ -87,12 +89,22 @@ impl StretchOfMaterials {
 }
 
 impl FailureCriterion {
-    /// The stretch that breaks bonds of a lattice; infinite where none does, and where materials say so.
-    pub fn at(&self, lattice: usize) -> f64 {
+    /// The stretch that breaks a bond of a lattice between two materials; infinite where none does.
+    pub fn at(&self, lattice: usize, [a, b]: [u16; 2]) -> f64 {
         match self {
             Self::Uniform(s) => *s,
-            Self::Tearing(_) | Self::ByMaterials(_) => f64::INFINITY,
             Self::PerLattice(list) => list.get(lattice).copied().unwrap_or(f64::INFINITY),
+            Self::ByMaterials(stretch) => stretch.at(a, b),
+            Self::Tearing(_) => f64::INFINITY,
+        }
+    }
+
+    /// The stretch that breaks the bonds of the first lattice, whatever their materials; none of a criterion that asks for these, or for no stretch.
+    pub fn single(&self) -> Option<f64> {
+        match self {
+            Self::Uniform(s) => Some(*s),
+            Self::PerLattice(list) => list.first().copied(),
+            Self::ByMaterials(_) | Self::Tearing(_) => None,
         }
     }
 }

@@ -129,16 +129,11 @@ impl<const D: usize> PassInput<'_, D> {
             (None, Some(_)) => BondForce::Law { law, body },
             (None, None) => return Err(SystemError::Law { law: law.name() }),
         };
-        let by_bond = |i: usize, _: usize, _: &Vector<D>| {
-            let critical = behaviour.failure.as_ref();
-            critical.map_or(f64::INFINITY, |c| c.at(body.cloud.horizon.lattice_of(i)))
-        };
-        let material = &body.cloud.material;
-        let by_materials = |i: usize, k: usize, _: &Vector<D>| match &behaviour.failure {
-            Some(FailureCriterion::ByMaterials(stretch)) => {
-                stretch.at(material[i], material[families.of(i)[k] as usize])
-            }
-            _ => f64::INFINITY,
+        let material = |p: usize| body.cloud.material.get(p).copied().unwrap_or(0);
+        let by_bond = |i: usize, k: usize, _: &Vector<D>| {
+            let materials = [material(i), material(families.of(i)[k] as usize)];
+            let at = |c: &FailureCriterion| c.at(body.cloud.horizon.lattice_of(i), materials);
+            behaviour.failure.as_ref().map_or(f64::INFINITY, at)
         };
         let broken = behaviour
             .broken
@@ -156,9 +151,8 @@ impl<const D: usize> PassInput<'_, D> {
                 None if law.damages() => Some(BondCriterion::Uniform(f64::INFINITY)),
                 None => None,
                 Some(FailureCriterion::Uniform(s)) => Some(BondCriterion::Uniform(*s)),
-                Some(FailureCriterion::PerLattice(_)) => Some(BondCriterion::PerBond(&by_bond)),
-                Some(FailureCriterion::ByMaterials(_)) => {
-                    Some(BondCriterion::PerBond(&by_materials))
+                Some(FailureCriterion::PerLattice(_) | FailureCriterion::ByMaterials(_)) => {
+                    Some(BondCriterion::PerBond(&by_bond))
                 }
                 Some(FailureCriterion::Tearing(p)) => Some(BondCriterion::TearingParameter(*p)),
             }

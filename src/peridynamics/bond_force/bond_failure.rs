@@ -1,4 +1,6 @@
-//! What breaks bonds of the generic pass.
+//! Failure of bonds in the generic pass.
+
+#![deny(clippy::wildcard_enum_match_arm)]
 
 use super::{BondCriterion, BondSetup, Failure};
 use crate::peridynamics::{PdBody, tearing_parameter::TearingParameter};
@@ -20,23 +22,43 @@ impl BondFailure {
             return Self::Never;
         };
         let points = setup.position.len();
-        if let BondCriterion::TearingParameter(critical) = failure.critical {
-            // of whole families: those of the pass may lack bonds that a seam has of its own
-            let whole = (0..points).map(|i| match body.is_foot(i) {
-                true => 0.0,
-                false => body.volume_of_family(i, setup.volume),
-            });
-            let whole: Vec<f64> = whole.collect();
-            let horizon = &body.cloud.horizon;
-            return Self::Tearing(TearingParameter::new(critical, &whole, horizon));
-        }
-        let mut limit = Vec::with_capacity(setup.families.neighbours.len());
-        for i in 0..points {
-            for (k, &j) in setup.families.of(i).iter().enumerate() {
-                limit.push(setup.limit(i, k, &setup.bond(i, j as usize)));
+        match failure.critical {
+            BondCriterion::TearingParameter(critical) => {
+                // of whole families: those of the pass may lack bonds that a seam has of its own
+                let whole = (0..points).map(|i| match body.is_foot(i) {
+                    true => 0.0,
+                    false => body.volume_of_family(i, setup.volume),
+                });
+                let whole: Vec<f64> = whole.collect();
+                let horizon = &body.cloud.horizon;
+                Self::Tearing(TearingParameter::new(critical, &whole, horizon))
+            }
+            BondCriterion::Uniform(_) | BondCriterion::PerBond(_) => {
+                let mut limit = Vec::with_capacity(setup.families.neighbours.len());
+                for i in 0..points {
+                    for (k, &j) in setup.families.of(i).iter().enumerate() {
+                        limit.push(setup.limit(i, k, &setup.bond(i, j as usize)));
+                    }
+                }
+                Self::Stretch(limit)
             }
         }
-        Self::Stretch(limit)
+    }
+
+    /// The numbers of its history, for a checkpoint.
+    pub(super) fn kept(&self) -> &[f64] {
+        match self {
+            Self::Never | Self::Stretch(_) => &[],
+            Self::Tearing(tearing) => tearing.values(),
+        }
+    }
+
+    /// The same, to be put back.
+    pub(super) fn kept_mut(&mut self) -> &mut [f64] {
+        match self {
+            Self::Never | Self::Stretch(_) => &mut [],
+            Self::Tearing(tearing) => tearing.values_mut(),
+        }
     }
 
     /// Numbers that it keeps \[8 bytes\].

@@ -1,5 +1,7 @@
 //! Failure in the generic pass: which bonds break, what they stored, and how that is saved.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use super::{
     bond_failure::BondFailure,
     bond_heat::Heat,
@@ -49,17 +51,13 @@ impl<const D: usize> Generic<D> {
             }
             BondFailure::Tearing(tearing) => tearing.breaks(i, self.neighbour(bond)),
         };
-        if matches!(self.failure, BondFailure::Never) {
-            return Vec::new();
-        }
+        // the points at which bonds may fail
         let least = match &self.failure {
-            BondFailure::Tearing(tearing) => Some(tearing.least_that_breaks()),
-            _ => None,
+            BondFailure::Never => return Vec::new(),
+            BondFailure::Stretch(_) => None,
+            BondFailure::Tearing(tearing) => Some((tearing.values(), tearing.least_that_breaks())),
         };
-        let may = |i: usize| match (&self.failure, least) {
-            (BondFailure::Tearing(tearing), Some(least)) => tearing.values()[i] >= least,
-            _ => true,
-        };
+        let may = |i: usize| least.is_none_or(|(values, least)| values[i] >= least);
         parallel::listed(self.position.len(), 64, |i, failing| {
             let is_flattened = self.is_flattened(i, u);
             if self.no_fail[i] || !(is_flattened || may(i)) {
@@ -117,10 +115,7 @@ impl<const D: usize> Generic<D> {
             let bonds = self.intact.len() as u64;
             words = super::pack(&bits.collect::<Vec<u8>>(), bonds);
         }
-        let torn = match &self.failure {
-            BondFailure::Tearing(tearing) => tearing.values(),
-            _ => &[],
-        };
+        let torn = self.failure.kept();
         let history = self.past.point.iter().chain(&self.past.bonds).chain(torn);
         words.extend(history.map(|x| x.to_bits()));
         let drag = self.points.as_ref().and_then(|p| p.drag.as_ref());
@@ -133,10 +128,7 @@ impl<const D: usize> Generic<D> {
 
     /// Puts them back; false, and nothing changed, if they belong to another pass.
     pub(super) fn restore(&mut self, state: &[u64]) -> bool {
-        let torn = match &self.failure {
-            BondFailure::Tearing(tearing) => tearing.values().len(),
-            _ => 0,
-        };
+        let torn = self.failure.kept().len();
         let drag = self.points.as_mut().and_then(|p| p.drag.as_mut());
         let dragged = drag.map_or(0, |drag| drag.kept().count());
         let carried = self.carried.as_ref().map_or(0, |c| c.numbers().count());
@@ -150,17 +142,16 @@ impl<const D: usize> Generic<D> {
         match &self.failure {
             BondFailure::Never if !words.is_empty() => return false,
             BondFailure::Never => {}
-            _ if !super::unpack(words, bonds, &mut bits) => return false,
-            _ => {
+            BondFailure::Stretch(_) | BondFailure::Tearing(_) => {
+                if !super::unpack(words, bonds, &mut bits) {
+                    return false;
+                }
                 for (bond, intact) in self.intact.iter_mut().enumerate() {
                     *intact = bits[bond / 8] >> (bond % 8) & 1 == 1;
                 }
             }
         }
-        let torn = match &mut self.failure {
-            BondFailure::Tearing(tearing) => tearing.values_mut(),
-            _ => &mut [],
-        };
+        let torn = self.failure.kept_mut();
         let own = self.past.point.iter_mut().chain(&mut self.past.bonds);
         let drag = self.points.as_mut().and_then(|p| p.drag.as_mut());
         let moved = drag.into_iter().flat_map(|drag| drag.kept_mut());

@@ -220,7 +220,7 @@ fn tangents_forces_and_energies_of_every_law_belong_together() {
 }
 
 /// Size of the strain of points whose stress is compared with the derivative of their energy: below what any law flows, softens or is damaged at.
-const STRAIN: f64 = 1e-4;
+const STRAIN: f64 = 1e-3;
 
 fn stress_of_energy<const D: usize>(counts: [usize; D]) {
     let case = case(counts, 0.2, false);

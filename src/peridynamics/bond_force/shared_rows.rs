@@ -168,7 +168,9 @@ impl Whole {
         };
         let stretch = match setup.failure.map(|f| f.critical) {
             Some(BondCriterion::PerBond(f)) => numbers(f),
-            _ => Vec::new(),
+            Some(BondCriterion::Uniform(_) | BondCriterion::TearingParameter(_)) | None => {
+                Vec::new()
+            }
         };
         let mut neighbours = vec![0; all];
         shared.each_bond(
@@ -213,7 +215,8 @@ pub(super) fn with_all_families<const D: usize, T>(
     let failure = setup.failure.map(|failure| Failure {
         critical: match failure.critical {
             BondCriterion::PerBond(_) => BondCriterion::PerBond(&stretch),
-            other => other,
+            BondCriterion::Uniform(s) => BondCriterion::Uniform(s),
+            BondCriterion::TearingParameter(p) => BondCriterion::TearingParameter(p),
         },
         ..failure
     });

@@ -1,5 +1,7 @@
 //! The moving system of a scene: what moves, with what mass, from where.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use crate::coupling::semidiscrete::behaviour::{
     BondBehaviour, ContactBehaviour, FailureCriterion, SystemError,
 };
@@ -407,18 +409,13 @@ pub(crate) fn plane_energy<const D: usize>(
     };
     let knows_energy =
         (model.peridynamics.as_ref()).is_some_and(|p| p.law.bond_energy(1.0).is_some());
-    let has_one = !matches!(
-        critical,
-        FailureCriterion::Tearing(_) | FailureCriterion::ByMaterials(_)
-    );
-    if !has_one || !knows_energy {
+    let Some(stretch) = critical.single().filter(|_| knows_energy) else {
         return Ok(None);
-    }
+    };
     let planes = model.plane_energies()?;
     let [(_, per_square)] = planes[..] else {
         return Ok(None);
     };
-    let stretch = critical.at(0);
     let law = model
         .peridynamics
         .as_ref()

@@ -199,8 +199,9 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
             Some(follow) => {
                 let critical = failure_criterion(model, rest)?.filter(|_| model.body().is_some());
                 critical.map(|critical| {
+                    let critical = critical.single().unwrap_or(f64::INFINITY);
                     let speed = fastest_crack(model, |m| rest.density[m as usize]);
-                    ZoneMonitor::new(follow, model, critical.at(0), speed, pace.step)
+                    ZoneMonitor::new(follow, model, critical, speed, pace.step)
                 })
             }
             None => None,

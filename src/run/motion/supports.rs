@@ -1,5 +1,7 @@
 //! What holds the body: the force of each condition that prescribes how sites move, and by how much it has moved them.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use std::sync::Arc;
 
 use crate::observe::summary::Reaction;

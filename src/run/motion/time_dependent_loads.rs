@@ -1,5 +1,7 @@
 //! What drives a scene: its loads and prescribed motion as functions of time.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use std::borrow::Cow;
 
 use super::driven_impactors::{DrivenImpactors, prescribed};

@@ -1,5 +1,7 @@
 //! Growth of modes: whether a motion stays bounded, asked before the first step, and told with the resolution of the answer.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use crate::coupling::{Definiteness, Model, Operator};
 use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::observe::report::number;
@@ -79,7 +81,12 @@ pub(crate) fn free_start<'a, const D: usize>(
 pub(crate) fn remedy(coupling: &CouplingSpec) -> &'static str {
     match coupling {
         CouplingSpec::PartialStress(_) => REMEDY,
-        _ => REMEDY_SEAM,
+        CouplingSpec::Splice(_)
+        | CouplingSpec::Blending(_)
+        | CouplingSpec::Balanced(_)
+        | CouplingSpec::Truncated(_)
+        | CouplingSpec::Local(_)
+        | CouplingSpec::Nonlocal(_) => REMEDY_SEAM,
     }
 }
 

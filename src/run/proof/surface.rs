@@ -1,5 +1,7 @@
 //! Free surfaces, supports, cracks and voids: how far a place lies from them, and what becomes of a facet there.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use rustc_hash::FxHashMap;
 
 use super::classes::Skin;

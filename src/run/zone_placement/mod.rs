@@ -315,7 +315,7 @@ fn refuse_damage<const D: usize>(material: &Material<D>, span: &Span) -> Result<
     let does = match material.fracture {
         _ if material.law.damages() => "takes their stiffness by a damage before they break",
         Some(Fracture::Tearing(_)) => "breaks them by a tearing parameter",
-        _ => return Ok(()),
+        Some(Fracture::Energy(_) | Fracture::Stretch(_)) | None => return Ok(()),
     };
     Err(SceneError::new(
         SceneErrorKind::Conflict,

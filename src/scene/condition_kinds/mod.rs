@@ -9,7 +9,7 @@
 //! | `symmetry.rs`, `rotation.rs` | planes of symmetry, rigid rotations |
 //! | `spring.rs` | springs to the ground |
 //!
-//! A condition that implements [`ConditionKind`] and has its line in the list at the end of this file is one of scenes, by its key. Nodal forces, resultants, work, the proof of totals
+//! A condition that implements `ConditionKind` and has its line in the list at the end of this file is one of scenes, by its key. Nodal forces, resultants, work, the proof of totals
 //! and first moments, sections and loaded surfaces follow from the [`super::load::Load`] that it builds: no other place names a load.
 
 mod body_force;
