@@ -1,8 +1,8 @@
-//! Springs between sites and the ground: rows that are added to a stiffness, and a force term.
+//! Springs between sites and the ground: rows that are added to a stiffness.
 
 use std::collections::BTreeMap;
 
-use super::{BlockCsr, ForceTerm, Interval, RateBounds, SharedRows};
+use super::{BlockCsr, SharedRows};
 
 /// The stiffness `S` of springs between sites and the ground \[N/m\]: symmetric, and no displacement has a negative energy.
 ///
@@ -142,7 +142,7 @@ impl SpringRows {
     }
 
     /// Adds `Σ_b |S_ab|` to every scalar row's sum.
-    fn add_sums_to(&self, sums: &mut [f64]) {
+    pub(super) fn add_sums_to(&self, sums: &mut [f64]) {
         let d = self.rows.block;
         self.each(|site, _, blocks| {
             for block in blocks.chunks_exact(d * d) {
@@ -152,54 +152,6 @@ impl SpringRows {
                 }
             }
         });
-    }
-}
-
-impl ForceTerm for SpringRows {
-    fn own_masses(&self) -> Vec<f64> {
-        Vec::new()
-    }
-
-    fn add_force(&self, u: &[f64], force: &mut [f64], _interval: Interval) {
-        self.add_product(u, force);
-    }
-
-    fn rows(&self) -> Option<&SpringRows> {
-        Some(self)
-    }
-
-    fn add_row_sums(&self, sums: &mut Vec<f64>) {
-        self.add_sums_to(sums);
-    }
-
-    fn difference_length(&self) -> Option<f64> {
-        None
-    }
-
-    fn rate_bounds(&self, _mass: &[f64]) -> RateBounds {
-        RateBounds::default()
-    }
-
-    fn round_off(&self, _u: &[f64]) -> f64 {
-        0.0
-    }
-
-    fn energy(&self, u: &[f64]) -> f64 {
-        SpringRows::energy(self, u)
-    }
-
-    fn commit(&self, _u: &[f64], _interval: Interval) {}
-
-    fn dissipated(&self) -> Option<f64> {
-        None
-    }
-
-    fn state(&self) -> Vec<u64> {
-        Vec::new()
-    }
-
-    fn restore(&self, state: &[u64]) -> bool {
-        state.is_empty()
     }
 }
 

@@ -53,3 +53,51 @@ pub trait ForceTerm: Send + Sync {
     /// Puts back what [`ForceTerm::state`] gave; false if it belongs to another term.
     fn restore(&self, state: &[u64]) -> bool;
 }
+
+impl ForceTerm for SpringRows {
+    fn own_masses(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    fn add_force(&self, u: &[f64], force: &mut [f64], _interval: Interval) {
+        self.add_product(u, force);
+    }
+
+    fn rows(&self) -> Option<&SpringRows> {
+        Some(self)
+    }
+
+    fn add_row_sums(&self, sums: &mut Vec<f64>) {
+        self.add_sums_to(sums);
+    }
+
+    fn difference_length(&self) -> Option<f64> {
+        None
+    }
+
+    fn rate_bounds(&self, _mass: &[f64]) -> RateBounds {
+        RateBounds::default()
+    }
+
+    fn round_off(&self, _u: &[f64]) -> f64 {
+        0.0
+    }
+
+    fn energy(&self, u: &[f64]) -> f64 {
+        SpringRows::energy(self, u)
+    }
+
+    fn commit(&self, _u: &[f64], _interval: Interval) {}
+
+    fn dissipated(&self) -> Option<f64> {
+        None
+    }
+
+    fn state(&self) -> Vec<u64> {
+        Vec::new()
+    }
+
+    fn restore(&self, state: &[u64]) -> bool {
+        state.is_empty()
+    }
+}
