@@ -175,14 +175,19 @@ fn closed(kinematics: Kinematics, poisson: f64, component: &str, stretch: f64, h
 }
 
 fn check(kinematics: Kinematics) {
-    for stuff in every_law(kinematics) {
+    for stuff in every_law(kinematics).iter().filter(|s| !s.is_variant) {
         let mut ran = 0;
         for (coupling, bonds) in COUPLINGS {
-            for way in [Way::AtRest, Way::LoadSteps, Way::InTime] {
+            // seams of solids at rest alone, which takes the longest as it is
+            let ways: &[Way] = match (kinematics, coupling) {
+                (Kinematics::Solid, "splice" | "truncated") => &[Way::AtRest],
+                _ => &[Way::AtRest, Way::LoadSteps, Way::InTime],
+            };
+            for &way in ways {
                 // what relaxes is pressed less and less
                 let relaxes = way != Way::AtRest && stuff.text.contains("relax");
                 for (stretch, held) in [(FREE, false), (HELD, true)] {
-                    let text = scene(kinematics, &stuff, coupling, bonds, (way, stretch, held));
+                    let text = scene(kinematics, stuff, coupling, bonds, (way, stretch, held));
                     if (held && relaxes) || read(&text, &[]).is_err() {
                         continue;
                     }
