@@ -8,8 +8,7 @@ use super::{
 };
 
 /// Laws whose points have a stress of their own, and the viscoelastic position-aware solid: nothing tells them a temperature yet, and scenes say so.
-const WITHOUT_EXPANSION: [&str; 8] = [
-    "correspondence",
+const WITHOUT_EXPANSION: [&str; 7] = [
     "damage-correspondence",
     "johnson-cook",
     "neo-hooke",

@@ -40,7 +40,8 @@ impl MaterialSpec {
             Self::BondBased(m) => m.thermal_expansion.as_ref(),
             Self::Lps(m) => m.thermal_expansion.as_ref(),
             Self::Named(m) => m.thermal_expansion.as_ref(),
-            Self::Correspondence(_) | Self::Umat(_) => None,
+            Self::Correspondence(m) => m.thermal_expansion.as_ref(),
+            Self::Umat(_) => None,
         }
     }
 }
@@ -274,6 +275,9 @@ pub struct CorrespondenceSpec {
     /// Density.
     #[serde(default)]
     pub density: Option<Number>,
+    /// Linear thermal expansion α per degree, with `[temperature]`.
+    #[serde(default)]
+    pub thermal_expansion: Option<Number>,
     /// Strength of the stabilising bond force, relative to that of an LPS; 1 if left out, 0 switches it off.
     #[serde(default)]
     pub stabilisation: Option<Number>,
