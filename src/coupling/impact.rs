@@ -19,6 +19,8 @@
 //! Contact that opens and closes within a step does not keep its energy, however stable the step: a bar of points that strikes at `(ω Δt)² = 1.3` gains several times its energy, at 0.5 a thousandth. In motion
 //! the bound therefore counts [`RESOLVED`] times, so that `(ω Δt)² ≤ 1`. The sum over the sites that touch counts as often once more: a light impactor carries all of its energy through one contact of a few steps.
 
+use std::sync::{Mutex, PoisonError};
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -55,7 +57,7 @@ pub struct RigidImpactor<const D: usize> {
 }
 
 /// Contact of the sites of a model with rigid impactors.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Impact<const D: usize> {
     impactors: Vec<RigidImpactor<D>>,
     /// Positions of the sites at rest.
@@ -74,6 +76,8 @@ pub struct Impact<const D: usize> {
     smallest: f64,
     /// How often contact counts in the bounds of eigenvalues and row sums.
     counted: f64,
+    /// Memory for the forces on impactors.
+    pushes: Mutex<Vec<f64>>,
 }
 
 /// The sites that touch an impactor.
@@ -83,12 +87,6 @@ pub struct ContactPatch {
     pub sites: u64,
     /// How many lie side by side across the contact.
     pub across: f64,
-}
-
-/// What one chunk of sites does to one impactor.
-struct Touch<const D: usize> {
-    impactor: usize,
-    force: Vector<D>,
 }
 
 impl<const D: usize> Impact<D> {
@@ -116,6 +114,7 @@ impl<const D: usize> Impact<D> {
             smallest,
             size: sizes,
             counted,
+            pushes: Mutex::default(),
         }
     }
 
@@ -177,30 +176,25 @@ impl<const D: usize> Impact<D> {
         let dofs = self.sites() * D;
         let (u, moved) = u.split_at(dofs);
         let (force, on_impactors) = force.split_at_mut(dofs);
+        // the force of each chunk of sites on each impactor, in memory that is kept
+        let each = self.impactors.len() * D;
+        let mut pushes = self.pushes.lock().unwrap_or_else(PoisonError::into_inner);
+        pushes.clear();
+        pushes.resize(each * dofs.div_ceil(CHUNK * D), 0.0);
         let both = force.par_chunks_mut(CHUNK * D).zip(u.par_chunks(CHUNK * D));
-        let touched: Vec<Vec<Touch<D>>> =
-            parallel::map_each(both.enumerate(), |(chunk, (force, u))| {
-                let mut found: Vec<Touch<D>> = Vec::new();
-                self.each(chunk, u, moved, |i, impactor, k, depth, out| {
-                    let push = out * (k * depth);
-                    for a in 0..D {
-                        force[i * D + a] -= push[a];
-                    }
-                    match found.iter_mut().find(|t| t.impactor == impactor) {
-                        Some(touch) => touch.force += push,
-                        None => found.push(Touch {
-                            impactor,
-                            force: push,
-                        }),
-                    }
-                });
-                found
+        let all = both.zip(pushes.par_chunks_mut(each)).enumerate();
+        parallel::for_each(all, |(chunk, ((force, u), pushes))| {
+            self.each(chunk, u, moved, |i, impactor, k, depth, out| {
+                let push = out * (k * depth);
+                for a in 0..D {
+                    force[i * D + a] -= push[a];
+                    pushes[impactor * D + a] += push[a];
+                }
             });
-        for touch in touched.iter().flatten() {
-            let own = &mut on_impactors[touch.impactor * D..][..D];
-            own.iter_mut()
-                .zip(touch.force.iter())
-                .for_each(|(f, p)| *f += p);
+        });
+        for push in pushes.chunks_exact(each) {
+            let both = on_impactors.iter_mut().zip(push);
+            both.for_each(|(f, p)| *f += p);
         }
     }
 

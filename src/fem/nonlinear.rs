@@ -12,8 +12,6 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 mod tangent;
 
 use super::cell::{MAX_NODES, Rule};
@@ -56,6 +54,19 @@ struct Excess<const D: usize> {
     across: f64,
     /// Its volume.
     volume: f64,
+}
+
+impl<const D: usize> Excess<D> {
+    /// None.
+    fn zero() -> Self {
+        Self {
+            stored: 0.0,
+            dissipated: 0.0,
+            stress: Tensor::zeros(),
+            across: 0.0,
+            volume: 0.0,
+        }
+    }
 }
 
 /// Elements of laws that are not linear, with what their quadrature points remember.
@@ -128,7 +139,7 @@ impl<const D: usize> NonlinearElements<D> {
         }
         Ok(Some(Self {
             laws: laws.laws,
-            excess: Vec::new(),
+            excess: vec![Excess::zero(); elements.len()],
             forces: vec![Vector::zeros(); held],
             elements,
             past: vec![0.0; numbers],
@@ -169,36 +180,16 @@ impl<const D: usize> NonlinearElements<D> {
         step: f64,
     ) {
         let (laws, past) = (&self.laws, &self.past);
-        let mut present = std::mem::take(&mut self.present);
-        let mut slices = Vec::with_capacity(self.elements.len());
-        let mut rest = present.as_mut_slice();
-        let mut forces = self.forces.as_mut_slice();
-        for (e, element) in self.elements.iter().enumerate() {
-            let next = self.elements.get(e + 1);
-            let end = next.map_or(past.len(), |e| e.first);
-            let (own, others) = rest.split_at_mut(end - element.first);
-            let nodes = mesh.cell(element.cell as usize).len();
-            let (force, other_forces) = forces.split_at_mut(nodes);
-            slices.push((own, force));
-            (rest, forces) = (others, other_forces);
-        }
-        self.elements
-            .par_iter()
-            .zip(slices)
-            .map(|(element, (present, force))| {
-                let law = laws[element.law as usize].as_ref();
-                excess(
-                    mesh,
-                    element,
-                    law,
-                    &displacement,
-                    step,
-                    past,
-                    (present, force),
-                )
-            })
-            .collect_into_vec(&mut self.excess);
-        self.present = present;
+        let of_element = |element: &Element, own: (&mut [f64], &mut [Vector<D>])| {
+            let law = laws[element.law as usize].as_ref();
+            excess(mesh, element, law, &displacement, step, past, own)
+        };
+        let own = (
+            &mut self.present[..],
+            &mut self.forces[..],
+            &mut self.excess[..],
+        );
+        each_element(&self.elements, own, &of_element);
     }
 
     /// What the elements around a node add to its force \[N\], of the last response.
@@ -327,6 +318,43 @@ fn mean_gradients<const D: usize>(
     Some(mean)
 }
 
+/// What elements write to: the numbers that their points remember at present, their nodal forces, and the rest.
+type Written<'a, const D: usize> = (&'a mut [f64], &'a mut [Vector<D>], &'a mut [Excess<D>]);
+
+/// Elements of a task.
+const ELEMENTS: usize = 64;
+
+/// Responses of some elements, halved until each part is a task: none makes a list of what it writes to.
+fn each_element<const D: usize>(
+    elements: &[Element],
+    (present, forces, excess): Written<'_, D>,
+    of: &(impl Fn(&Element, (&mut [f64], &mut [Vector<D>])) -> Excess<D> + Sync),
+) {
+    let Some(begin) = elements.first() else {
+        return;
+    };
+    if elements.len() > ELEMENTS {
+        let half = elements.len() / 2;
+        let (left, right) = elements.split_at(half);
+        let (present, more) = present.split_at_mut(right[0].first - begin.first);
+        let (forces, further) = forces.split_at_mut(right[0].node - begin.node);
+        let (excess, rest) = excess.split_at_mut(half);
+        rayon::join(
+            || each_element(left, (present, forces, excess), of),
+            || each_element(right, (more, further, rest), of),
+        );
+        return;
+    }
+    for (e, element) in elements.iter().enumerate() {
+        let next = elements.get(e + 1);
+        let numbers = element.first - begin.first
+            ..next.map_or(present.len(), |next| next.first - begin.first);
+        let nodes =
+            element.node - begin.node..next.map_or(forces.len(), |next| next.node - begin.node);
+        excess[e] = of(element, (&mut present[numbers], &mut forces[nodes]));
+    }
+}
+
 /// What an element has beyond the linear one; overwrites what its points remember at present, and its nodal forces \[N\].
 fn excess<const D: usize>(
     mesh: &Mesh<D>,
@@ -342,13 +370,7 @@ fn excess<const D: usize>(
     for (u, &n) in u.iter_mut().zip(nodes) {
         *u = displacement(n);
     }
-    let mut sum = Excess {
-        stored: 0.0,
-        dissipated: 0.0,
-        stress: Tensor::zeros(),
-        across: 0.0,
-        volume: 0.0,
-    };
+    let mut sum = Excess::zero();
     forces.fill(Vector::zeros());
     let each = element.each;
     let mut point = 0;

@@ -6,6 +6,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::{Kinematics, LocalLaw, LocalResponse, WideBand};
 use crate::tensor::{Tensor, Tensor4};
 
+/// Numbers that a law remembers of a point, up to which they take no memory of their own.
+const FEW: usize = 32;
+
 /// Most corrections of the strain out of the body.
 const ITERATIONS: usize = 60;
 
@@ -110,8 +113,16 @@ impl<const D: usize> Reduced<D> {
     ) -> f64 {
         let solid = self.law.tangent();
         let resistance: f64 = (self.free..3).map(|g| solid.get(2, 2, g, g)).sum();
-        let mut present = vec![0.0; past.len()];
-        let mut stress = |out: f64| self.at(gradient, out, step, past, &mut present).stress[(2, 2)];
+        // on the stack, for this is asked at every point of every step
+        let (mut few, mut many) = ([0.0; FEW], Vec::new());
+        let present = match past.len() <= FEW {
+            true => &mut few[..past.len()],
+            false => {
+                many.resize(past.len(), 0.0);
+                &mut many[..]
+            }
+        };
+        let mut stress = |out: f64| self.at(gradient, out, step, past, present).stress[(2, 2)];
         let along: f64 = (0..D)
             .map(|k| solid.get(2, 2, k, k) * gradient[(k, k)])
             .sum();

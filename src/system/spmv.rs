@@ -3,6 +3,8 @@
 //! Along a run of rows that share their blocks (see [`super::SharedRows`]) a product is a stencil: for each block, a stretch of the argument is added to a
 //! stretch of the result, which the compiler turns into vector instructions, chosen by `pulp` for the machine at hand. Sums are taken in the same order as row by row.
 
+use std::cell::Cell;
+
 use super::BlockCsr;
 use crate::parallel;
 
@@ -113,14 +115,16 @@ fn of_block<const D: usize>(k: &BlockCsr, marked: Option<&[bool]>, x: &[f64], y:
         return;
     };
     // component by component, so that neighbouring rows read neighbouring numbers
-    let planes: [Vec<f64>; D] = std::array::from_fn(|b| {
-        let mut plane = vec![0.0; x.len() / D];
-        parallel::for_each_chunk(&mut plane, SITES, 1, |chunk, plane| {
+    let mut kept = PLANES.take();
+    kept.resize_with(kept.len().max(D), Vec::new);
+    for (b, plane) in kept[..D].iter_mut().enumerate() {
+        plane.resize(x.len() / D, 0.0);
+        parallel::for_each_chunk(plane, SITES, 1, |chunk, plane| {
             let x = x[chunk * SITES * D..].chunks_exact(D);
             plane.iter_mut().zip(x).for_each(|(p, x)| *p = x[b]);
         });
-        plane
-    });
+    }
+    let planes: [&[f64]; D] = std::array::from_fn(|b| &kept[b][..]);
     let arch = pulp::Arch::new();
     parallel::for_each_chunk(y, ROWS * D, 1, |chunk, y| {
         if !is_marked(marked, chunk) {
@@ -131,6 +135,12 @@ fn of_block<const D: usize>(k: &BlockCsr, marked: Option<&[bool]>, x: &[f64], y:
             || of_rows::<D>(k, follows, chunk * ROWS, x, &planes, y),
         );
     });
+    PLANES.set(kept);
+}
+
+thread_local! {
+    /// Memory for the components of an argument, which the thread that asks for a product takes and gives back: a step allocates nothing.
+    static PLANES: Cell<Vec<Vec<f64>>> = const { Cell::new(Vec::new()) };
 }
 
 /// Rows from `first` on, as many as `y` holds: runs in tiles, the rest row by row.
@@ -140,7 +150,7 @@ fn of_rows<const D: usize>(
     follows: &[bool],
     first: usize,
     x: &[f64],
-    planes: &[Vec<f64>; D],
+    planes: &[&[f64]; D],
     y: &mut [f64],
 ) {
     let end = first + y.len() / D;
@@ -175,7 +185,7 @@ fn of_tile<const D: usize, const T: usize>(
     columns: &[u32],
     blocks: &[f64],
     shift: usize,
-    planes: &[Vec<f64>; D],
+    planes: &[&[f64]; D],
     y: &mut [f64],
 ) {
     let mut sum = [[0.0; T]; D];

@@ -60,6 +60,7 @@ fn impact(sites: usize) -> Impact<3> {
         ),
         smallest: 0.1,
         counted: 1.0,
+        pushes: std::sync::Mutex::default(),
     }
 }
 
