@@ -141,8 +141,8 @@ fn steps_allocate_nothing() {
         };
         let found = allocations(&text);
         assert!(found.len() > 20, "{name}: {} steps", found.len());
-        // the last step writes a row; a peak of contact is looked at, and a list of neighbours may be renewed
+        // the last step writes a row; a peak of contact is looked at, and points that may touch are searched for now and then
         let quiet = found.iter().filter(|count| **count == 0).count();
-        assert!(10 * quiet >= 9 * (found.len() - 1), "{name}: {found:?}");
+        assert!(10 * quiet >= 8 * (found.len() - 1), "{name}: {found:?}");
     }
 }

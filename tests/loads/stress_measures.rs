@@ -406,12 +406,11 @@ fn check(kinematics: Kinematics, ways: &[Way]) {
     let mut turned = 0;
     for stuff in every_law(kinematics) {
         let mut ran = false;
-        // of a drag, which resists motion alone, in time
-        let ways = match stuff.is_variant && !stuff.text.contains("drag") {
-            true => &ways[..1],
-            false => ways,
-        };
         for &way in ways {
+            // a word more is tried one way
+            if ran && stuff.is_variant {
+                break;
+            }
             for (elements, bonds) in [(false, ""), (false, ", bonds = \"exact\""), (true, "")] {
                 let checked = checked(kinematics, &stuff, elements, bonds, way);
                 ran |= checked.is_some();
