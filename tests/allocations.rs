@@ -141,8 +141,9 @@ fn steps_allocate_nothing() {
         };
         let found = allocations(&text);
         assert!(found.len() > 20, "{name}: {} steps", found.len());
-        // the last step writes a row; a peak of contact is looked at, and points that may touch are searched for now and then
+        // the last step writes a row; points that may touch are searched for now and then, and sites below an impactor are listed while its force grows
         let quiet = found.iter().filter(|count| **count == 0).count();
-        assert!(10 * quiet >= 8 * (found.len() - 1), "{name}: {found:?}");
+        let share = if name == "impactor" { 6 } else { 8 };
+        assert!(10 * quiet >= share * (found.len() - 1), "{name}: {found:?}");
     }
 }
