@@ -178,7 +178,9 @@ impl<const D: usize> Impact<D> {
         let (force, on_impactors) = force.split_at_mut(dofs);
         // the force of each chunk of sites on each impactor, in memory that is kept
         let each = self.impactors.len() * D;
-        let mut pushes = self.pushes.lock().unwrap_or_else(PoisonError::into_inner);
+        // taken out, for a thread that waits for the loop may be asked for another force meanwhile
+        let kept = || self.pushes.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut pushes = std::mem::take(&mut *kept());
         pushes.clear();
         pushes.resize(each * dofs.div_ceil(CHUNK * D), 0.0);
         let both = force.par_chunks_mut(CHUNK * D).zip(u.par_chunks(CHUNK * D));
@@ -196,6 +198,7 @@ impl<const D: usize> Impact<D> {
             let both = on_impactors.iter_mut().zip(push);
             both.for_each(|(f, p)| *f += p);
         }
+        *kept() = pushes;
     }
 
     /// Norm of the forces \[N\] that rounding of places leaves at sites that touch: a depth is a difference of places. A site that lies on a surface to round-off touches by as much.

@@ -4,7 +4,7 @@ use super::model::Model;
 use crate::mesh::boundary::BoundaryFacet;
 use crate::mesh::{Facet, facet_corners};
 
-/// Whether any of the facets may belong to a cell that holds points: all of its nodes do. To find the cells themselves takes all facets of the mesh.
+/// Returns true if any of the facets may belong to a cell that holds points: all of its nodes do. To find the cells themselves takes all facets of the mesh.
 pub(crate) fn may_bound_zone<const D: usize>(model: &Model<D>, facets: &[Facet]) -> bool {
     let at_zone = |facet: &Facet| {
         let corners = facet_corners::<D>(facet);

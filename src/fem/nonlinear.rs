@@ -318,7 +318,7 @@ fn mean_gradients<const D: usize>(
     Some(mean)
 }
 
-/// What elements write to: the numbers that their points remember at present, their nodal forces, and the rest.
+/// Memory that elements write to: the numbers that their points remember at present, their nodal forces, and the rest.
 type Written<'a, const D: usize> = (&'a mut [f64], &'a mut [Vector<D>], &'a mut [Excess<D>]);
 
 /// Elements of a task.

@@ -46,7 +46,7 @@ impl ConditionTerms {
         Ok(terms)
     }
 
-    /// Whether there are none.
+    /// Returns true if there are none.
     pub fn is_empty(&self) -> bool {
         self.each.is_empty()
     }

@@ -77,12 +77,12 @@ impl<const D: usize> Components<D> {
         })
     }
 
-    /// Whether any component changes with time.
+    /// Returns true if any component changes with time.
     pub fn depends_on_time(&self) -> bool {
         self.0.iter().flatten().any(Expression::depends_on_time)
     }
 
-    /// Whether any component changes in space.
+    /// Returns true if any component changes in space.
     pub fn depends_on_position(&self) -> bool {
         self.0.iter().flatten().any(Expression::depends_on_position)
     }

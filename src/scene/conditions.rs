@@ -81,7 +81,7 @@ pub trait ConditionTerm<const D: usize>: std::fmt::Debug + Send + Sync {
     /// The nodes of each facet that it acts on.
     fn facets(&self) -> Vec<&[u32]>;
 
-    /// Whether it is linear in the displacement and stores what it takes, so that it may hold a body at rest.
+    /// Returns true if the force is linear in the displacement and stores what it takes, so that it may hold a body at rest.
     fn holds_at_rest(&self) -> bool;
 
     /// The term on the sites of a model; none if it meets none.
@@ -119,7 +119,7 @@ impl<const D: usize> Condition<D> {
         }
     }
 
-    /// Whether the condition prescribes how sites move.
+    /// Returns true if the condition prescribes how sites move.
     pub fn holds(&self) -> bool {
         match &self.prescribed {
             Prescribed::Displacement(_) | Prescribed::Velocity(_) | Prescribed::Field(_) => true,

@@ -10,7 +10,7 @@ use crate::mesh::boundary::BoundaryFacet;
 use crate::mesh::{Facet, Mesh};
 use crate::tensor::Vector;
 
-/// Where a displacement is prescribed.
+/// Place at which a displacement is prescribed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Support<const D: usize> {
     /// On a named set of the mesh: its nodes, and the facets among them if it is a set of facets.
@@ -26,7 +26,7 @@ pub enum Support<const D: usize> {
     Inside(Region<D>),
 }
 
-/// Where a condition holds: a set of the mesh, or a shape.
+/// Place of a condition: a set of the mesh, or a shape.
 pub(super) fn support<const D: usize>(
     place: &str,
     name: &Text,

@@ -32,7 +32,7 @@ pub trait ForceTerm: Send + Sync {
     /// The displacement \[m\] over which its force is differenced where its tangent is wanted; none for a force that is linear in the displacement.
     fn difference_length(&self) -> Option<f64>;
 
-    /// What it may add to the eigenvalues of the motion, `mass` being that of the body's sites.
+    /// Bounds of its part of the eigenvalues of the motion, `mass` being that of the body's sites.
     fn rate_bounds(&self, mass: &[f64]) -> RateBounds;
 
     /// Norm of the force \[N\] that rounding of places leaves at a displacement.
@@ -47,7 +47,7 @@ pub trait ForceTerm: Send + Sync {
     /// The energy that it has dissipated up to the last [`ForceTerm::commit`] \[J\]; none for a term that never does.
     fn dissipated(&self) -> Option<f64>;
 
-    /// What it remembers, for a checkpoint; empty for a term without memory.
+    /// Words of its memory for a checkpoint; empty for a term without memory.
     fn state(&self) -> Vec<u64>;
 
     /// Puts back what [`ForceTerm::state`] gave; false if it belongs to another term.

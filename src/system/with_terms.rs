@@ -16,7 +16,7 @@ pub struct WithTerms<'t, S> {
     mass: Vec<f64>,
     /// Unknowns of the body.
     dofs: usize,
-    /// Where the last force was asked for, of terms that remember.
+    /// Displacement and interval of the last force; none if no term remembers.
     last: Option<(Vec<f64>, Interval)>,
 }
 
@@ -39,7 +39,7 @@ where
         }
     }
 
-    /// What the body has of a list by dof.
+    /// The part of a list by dof that belongs to the body.
     fn own<'u>(&self, all: &'u [f64]) -> &'u [f64] {
         &all[..self.dofs]
     }
@@ -252,12 +252,19 @@ where
     }
 
     fn restore_damage(&mut self, state: &[u64]) -> bool {
-        let lengths: Vec<usize> = self.terms.iter().map(|t| t.state().len()).collect();
-        let of_terms: usize = lengths.iter().sum();
-        if of_terms == 0 {
+        if self.terms.iter().all(|term| term.state().is_empty()) {
             return self.body.restore_damage(state);
         }
-        let Some(of_body) = state.len().checked_sub(of_terms + lengths.len()) else {
+        // by the lengths that were kept: a term may remember more later than at the start
+        let Some(end) = state.len().checked_sub(self.terms.len()) else {
+            return false;
+        };
+        let (state, lengths) = state.split_at(end);
+        let lengths: Vec<usize> = lengths.iter().map(|length| *length as usize).collect();
+        let of_terms = lengths
+            .iter()
+            .try_fold(0usize, |sum, own| sum.checked_add(*own));
+        let Some(of_body) = of_terms.and_then(|own| state.len().checked_sub(own)) else {
             return false;
         };
         let (body, mut rest) = state.split_at(of_body);
@@ -268,5 +275,124 @@ where
             rest = others;
         }
         fits
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{Mutex, PoisonError};
+
+    use super::*;
+    use crate::system::{LinearMotion, RateBounds, SpringRows};
+
+    /// A term that remembers the displacements of all intervals.
+    #[derive(Default)]
+    struct Diary(Mutex<Vec<u64>>);
+
+    impl Diary {
+        fn read(&self) -> Vec<u64> {
+            self.0
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .clone()
+        }
+    }
+
+    impl ForceTerm for Diary {
+        fn own_masses(&self) -> Vec<f64> {
+            Vec::new()
+        }
+
+        fn add_force(&self, _u: &[f64], force: &mut [f64], _interval: Interval) {
+            force[0] += self.read().len() as f64;
+        }
+
+        fn rows(&self) -> Option<&SpringRows> {
+            None
+        }
+
+        fn add_row_sums(&self, _sums: &mut Vec<f64>) {}
+
+        fn difference_length(&self) -> Option<f64> {
+            None
+        }
+
+        fn rate_bounds(&self, _mass: &[f64]) -> RateBounds {
+            RateBounds::default()
+        }
+
+        fn round_off(&self, _u: &[f64]) -> f64 {
+            0.0
+        }
+
+        fn energy(&self, _u: &[f64]) -> f64 {
+            0.0
+        }
+
+        fn commit(&self, u: &[f64], _interval: Interval) {
+            let mut days = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            days.push(u[0].to_bits());
+        }
+
+        fn dissipated(&self) -> Option<f64> {
+            Some(self.read().len() as f64)
+        }
+
+        fn state(&self) -> Vec<u64> {
+            let mut all = vec![7];
+            all.extend(self.read());
+            all
+        }
+
+        fn restore(&self, state: &[u64]) -> bool {
+            let Some((7, days)) = state.split_first().map(|(first, days)| (*first, days)) else {
+                return false;
+            };
+            *self.0.lock().unwrap_or_else(PoisonError::into_inner) = days.to_vec();
+            true
+        }
+    }
+
+    fn system() -> WithTerms<'static, Box<dyn SemiDiscrete>> {
+        let body = LinearMotion {
+            stiffness: BlockCsr {
+                block: 1,
+                row_offsets: vec![0, 1],
+                columns: vec![0],
+                values: vec![2.0],
+                shared: None,
+            },
+            mass: vec![1.0],
+            symmetry: crate::system::Symmetry::Symmetric,
+        };
+        let terms: Vec<Arc<dyn ForceTerm>> =
+            vec![Arc::new(Diary::default()), Arc::new(Diary::default())];
+        WithTerms::new(Box::new(body) as Box<dyn SemiDiscrete>, terms)
+    }
+
+    #[test]
+    fn a_checkpoint_holds_what_terms_have_come_to_remember() {
+        let now = Interval {
+            end: 1.0,
+            length: 1.0,
+        };
+        let force = |system: &mut WithTerms<'static, Box<dyn SemiDiscrete>>, u: f64| {
+            let mut force = [0.0];
+            system.internal_force_into(&[u], &mut force, now, FailureUpdate::Frozen);
+            force[0]
+        };
+        let mut system = self::system();
+        for u in [0.5, 0.25, 0.125] {
+            force(&mut system, u);
+            system.commit();
+        }
+        let state = system.damage_state();
+        let mut other = self::system();
+        assert!(other.restore_damage(&state));
+        assert_eq!(other.damage_state(), state);
+        assert_eq!(force(&mut other, 1.0), 2.0 + 3.0 + 3.0);
+        assert_eq!(other.dissipation().map(|d| d.inelastic), Some(6.0));
+        assert!(!self::system().restore_damage(&state[1..]));
+        assert!(!self::system().restore_damage(&[]));
     }
 }

@@ -33,7 +33,7 @@ const COUPLINGS: [(&str, &str); 7] = [
     ("truncated", ", bonds = \"exact\""),
 ];
 
-/// How the body is brought to its temperature.
+/// Way in which the body is brought to its temperature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Way {
     AtRest,

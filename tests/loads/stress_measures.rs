@@ -18,7 +18,7 @@ const SMALL_TURN: f64 = 1e-4;
 /// A material of a scene.
 pub(super) struct Stuff {
     pub(super) key: &'static str,
-    /// Whether it differs from the one before by a word alone.
+    /// It differs from the one before by a word alone.
     pub(super) is_variant: bool,
     pub(super) text: String,
     pub(super) poisson: f64,

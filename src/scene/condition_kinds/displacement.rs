@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use super::ConditionKind;
 use crate::mesh::Mesh;
-use crate::scene::components::{components_in, finite};
+use crate::scene::components::{Components, components_in, finite};
 use crate::scene::conditions::{Condition, Prescribed, Support};
 use crate::scene::error::SceneError;
 use crate::scene::expression::Expression;
@@ -44,15 +44,32 @@ impl ConditionKind for DisplacementSpec {
         clock: Clock,
     ) -> Result<Condition<D>, SceneError> {
         let components = components_in(place, name, [&self.x, &self.y, &self.z], clock)?;
-        let support = support(place, name, self.on.as_ref(), self.inside.as_ref(), mesh)?;
-        if let Support::Set { nodes, .. } = &support {
-            let nodes = nodes.iter().map(|&n| mesh.nodes[n as usize]);
-            finite(place, name, &components, clock, nodes)?;
-        }
+        let at = (self.on.as_ref(), self.inside.as_ref());
+        let support = held(place, name, at, &components, mesh, clock)?;
         Ok(Condition {
             name: name.value.clone(),
             prescribed: Prescribed::Displacement(support),
             components,
         })
     }
+}
+
+/// The place where a motion is prescribed, `on` a set or `inside` a shape, whose components are numbers there.
+///
+/// # Errors
+/// [`SceneError`] for both or neither of the two, for a place that holds nothing, and for a component that is no number.
+pub(super) fn held<const D: usize>(
+    place: &str,
+    name: &Text,
+    (on, inside): (Option<&Text>, Option<&ShapeSpec>),
+    components: &Components<D>,
+    mesh: &Mesh<D>,
+    clock: Clock,
+) -> Result<Support<D>, SceneError> {
+    let support = support(place, name, on, inside, mesh)?;
+    if let Support::Set { nodes, .. } = &support {
+        let nodes = nodes.iter().map(|&n| mesh.nodes[n as usize]);
+        finite(place, name, components, clock, nodes)?;
+    }
+    Ok(support)
 }

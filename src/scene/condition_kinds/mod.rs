@@ -57,7 +57,7 @@ pub(crate) trait ConditionKind {
 /// Declares [`ConditionSpec`], the conditions by their keys.
 macro_rules! conditions {
     ($($(#[doc = $about:literal])+ $key:literal => $kind:ident($spec:ident)),* $(,)?) => {
-        /// What is prescribed somewhere.
+        /// A condition of a scene.
         #[derive(Clone, Debug, Deserialize, JsonSchema)]
         pub enum ConditionSpec {
             $($(#[doc = $about])+ #[serde(rename = $key)] $kind($spec),)*

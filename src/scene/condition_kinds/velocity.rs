@@ -3,13 +3,12 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::ConditionKind;
+use super::{ConditionKind, displacement::held};
 use crate::mesh::Mesh;
-use crate::scene::components::{Components, components_in, finite};
-use crate::scene::conditions::{Condition, Prescribed, Support};
+use crate::scene::components::{Components, components_in};
+use crate::scene::conditions::{Condition, Prescribed};
 use crate::scene::error::{SceneError, SceneErrorKind};
 use crate::scene::expression::Expression;
-use crate::scene::places::support;
 use crate::scene::solve::{Clock, Pacing};
 use crate::scene::spec::ShapeSpec;
 use crate::scene::value::Text;
@@ -45,11 +44,8 @@ impl ConditionKind for VelocitySpec {
     ) -> Result<Condition<D>, SceneError> {
         let components = components_in(place, name, [&self.x, &self.y, &self.z], clock)?;
         moves(place, name, &components, clock)?;
-        let support = support(place, name, self.on.as_ref(), self.inside.as_ref(), mesh)?;
-        if let Support::Set { nodes, .. } = &support {
-            let nodes = nodes.iter().map(|&n| mesh.nodes[n as usize]);
-            finite(place, name, &components, clock, nodes)?;
-        }
+        let at = (self.on.as_ref(), self.inside.as_ref());
+        let support = held(place, name, at, &components, mesh, clock)?;
         Ok(Condition {
             name: name.value.clone(),
             prescribed: Prescribed::Velocity(support),
