@@ -71,6 +71,8 @@ pub struct CoupledSystem<'a, const D: usize> {
     energy: ElementEnergy,
     /// Elements whose law is not linear, if there are any.
     elements: Option<LocalElements<D>>,
+    /// How elements expand whose law does so by itself; none where nothing expands.
+    heat: Option<FreeStretch<D>>,
     /// Who computes which sites, where several processes do.
     split: Option<split::Split<'a>>,
     /// Whether processes may each move their own sites, by what a run asks of its steps.
@@ -180,6 +182,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
             },
             energy,
             elements: None,
+            heat: behaviour.heat.clone(),
             split: None,
             is_shareable: false,
             own_steps: None,
@@ -195,7 +198,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         mut self,
         laws: &[Option<Arc<dyn LocalLaw<D>>>],
     ) -> Result<Self, SystemError> {
-        self.elements = LocalElements::new(self.model, laws)?;
+        self.elements = LocalElements::new(self.model, laws, self.heat.as_ref())?;
         if self.elements.is_some() && self.difference_length.is_none() {
             // there may be no points, and no spacing
             let mesh = &self.model.mesh;
@@ -293,7 +296,7 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
     ) -> u64 {
         let broken = self.linear_rows_and_bonds_into(u, force, interval, update);
         if let Some(elements) = &mut self.elements {
-            elements.add_force(self.model, u, interval.length, force);
+            elements.add_force(self.model, u, interval, force);
         }
         self.finish(force);
         broken
@@ -446,7 +449,7 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
     }
 
     fn rows_that_expand(&self, sites: &[u32]) -> BlockCsr {
-        match self.is_heated() {
+        match self.has_heated_bonds() {
             true => self.rows_beside_heated_bonds(sites),
             false => self.rows_at(sites),
         }

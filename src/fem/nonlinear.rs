@@ -81,6 +81,8 @@ pub struct NonlinearElements<const D: usize> {
     excess: Vec<Excess<D>>,
     /// Of each node of each element \[N\], of the last response.
     forces: Vec<Vector<D>>,
+    /// By how much each node of each element is displaced where it expands freely \[m\]; empty where nothing expands.
+    expanded: Vec<Vector<D>>,
     /// For each node of the mesh where its elements begin in `of_node`.
     offsets: Vec<u32>,
     /// The places of the nodes in `forces`, by ascending element.
@@ -141,6 +143,7 @@ impl<const D: usize> NonlinearElements<D> {
             laws: laws.laws,
             excess: vec![Excess::zero(); elements.len()],
             forces: vec![Vector::zeros(); held],
+            expanded: Vec::new(),
             elements,
             past: vec![0.0; numbers],
             present: vec![0.0; numbers],
@@ -172,6 +175,35 @@ impl<const D: usize> NonlinearElements<D> {
         self.elements.iter().map(|e| e.cell as usize)
     }
 
+    /// Gives the elements whose law expands by itself their temperature: by how much the nodes of a cell are displaced where it expands freely \[m\], and the stretch of the solid over that within the body. What they add is then beyond the linear
+    /// elements that expand likewise.
+    pub fn expand(&mut self, mesh: &Mesh<D>, of_cell: impl Fn(usize) -> (Vec<Vector<D>>, f64)) {
+        self.expanded.resize(self.forces.len(), Vector::zeros());
+        for element in &self.elements {
+            let law = self.laws[element.law as usize].as_ref();
+            let Some(place) = law.free_stretch() else {
+                continue;
+            };
+            let cell = element.cell as usize;
+            let (nodes, solid) = of_cell(cell);
+            let mut stretch = Vec::new();
+            let (mut mean, mut volume) = (0.0, 0.0);
+            for_each_point(mesh, cell, Rule::Stiffness, |p| {
+                let free = displacement_gradient(p, |a| nodes[a]).trace() / D as f64;
+                stretch.push(solid * free);
+                mean += solid * free * p.weight;
+                volume += p.weight;
+            });
+            if mean_gradients(mesh, element, law).is_some() {
+                stretch.fill(mean / volume);
+            }
+            for (point, stretch) in stretch.into_iter().enumerate() {
+                self.past[element.first + point * element.each + place] = stretch;
+            }
+            self.expanded[element.node..][..nodes.len()].copy_from_slice(&nodes);
+        }
+    }
+
     /// Responds to the displacement of the nodes \[m\] at the end of an interval of the length `step` \[s\] that began with the last [`NonlinearElements::commit`].
     pub fn respond(
         &mut self,
@@ -179,10 +211,13 @@ impl<const D: usize> NonlinearElements<D> {
         displacement: impl Fn(u32) -> Vector<D> + Sync,
         step: f64,
     ) {
-        let (laws, past) = (&self.laws, &self.past);
+        let (laws, past, expanded) = (&self.laws, &self.past, &self.expanded);
         let of_element = |element: &Element, own: (&mut [f64], &mut [Vector<D>])| {
             let law = laws[element.law as usize].as_ref();
-            excess(mesh, element, law, &displacement, step, past, own)
+            let nodes = mesh.cell(element.cell as usize).len();
+            let free = expanded.get(element.node..element.node + nodes);
+            let known = (past.as_slice(), free);
+            excess(mesh, element, law, &displacement, step, known, own)
         };
         let own = (
             &mut self.present[..],
@@ -242,11 +277,12 @@ impl<const D: usize> NonlinearElements<D> {
         let cell = element.cell as usize;
         for_each_point(mesh, cell, Rule::Stiffness, |_| points += 1);
         let mut present = vec![0.0; points * element.each];
-        let past = &self.past;
         let mut force = [Vector::zeros(); MAX_NODES];
         let force = &mut force[..mesh.cell(cell).len()];
+        let free = (self.expanded).get(element.node..element.node + force.len());
+        let known = (self.past.as_slice(), free);
         let into = (present.as_mut_slice(), force);
-        excess(mesh, element, law, displacement, 0.0, past, into)
+        excess(mesh, element, law, displacement, 0.0, known, into)
     }
 
     /// What was remembered of each cell, by name: means over its volume, the names in the order of the laws.
@@ -355,14 +391,14 @@ fn each_element<const D: usize>(
     }
 }
 
-/// What an element has beyond the linear one; overwrites what its points remember at present, and its nodal forces \[N\].
+/// What an element has beyond the linear one, which expands by the same displacements of its nodes; overwrites what its points remember at present, and its nodal forces \[N\].
 fn excess<const D: usize>(
     mesh: &Mesh<D>,
     element: &Element,
     law: &dyn LocalLaw<D>,
     displacement: &impl Fn(u32) -> Vector<D>,
     step: f64,
-    past: &[f64],
+    (past, expanded): (&[f64], Option<&[Vector<D>]>),
     (present, forces): (&mut [f64], &mut [Vector<D>]),
 ) -> Excess<D> {
     let nodes = mesh.cell(element.cell as usize);
@@ -387,7 +423,11 @@ fn excess<const D: usize>(
         let gradient = displacement_gradient(p, |a| u[a]);
         let own = point * each..(point + 1) * each;
         let past = &past[element.first..][own.clone()];
-        let linear = law.tangent().contract(&gradient);
+        let mechanical = match expanded {
+            Some(free) => gradient - displacement_gradient(p, |a| free[a]),
+            None => gradient,
+        };
+        let linear = law.tangent().contract(&mechanical);
         let shift = match has_mean_dilatation {
             true => (mean_dilatation - gradient.trace()) / D as f64,
             false => 0.0,
@@ -405,7 +445,7 @@ fn excess<const D: usize>(
                 *force += (mean - g) * pressure;
             }
         }
-        sum.stored += p.weight * (found.stored - 0.5 * linear.dot(&gradient));
+        sum.stored += p.weight * (found.stored - 0.5 * linear.dot(&mechanical));
         sum.dissipated += p.weight * found.dissipated;
         sum.stress += found.cauchy(&taken, is_objective) * p.weight;
         sum.across += found.across * p.weight;

@@ -9,6 +9,7 @@
 //! | `logarithmic_j2.rs` | the same for strains of any size |
 //! | `scalar_damage.rs`, `softening.rs` | isotropic scalar damage with a tensile strength and a fracture energy, and how it softens |
 //! | `generalised_maxwell.rs`, `prony.rs` | linear viscoelasticity: a Prony series of the shear modulus, for small strains |
+//! | `expanding.rs` | any law of solids that expands with its temperature |
 //! | `reduction.rs` | any law of solids in bars, plates and long bodies |
 //! | `algorithmic_tangent.rs` | differences of any law, for its algorithmic tangent |
 //! | `user_routine.rs` | what a scene asks of a user's compiled routine; crate `bondline-umat` loads it and makes a law of it |
@@ -20,6 +21,7 @@
 
 mod algorithmic_tangent;
 mod elastic;
+mod expanding;
 mod generalised_maxwell;
 mod hardening;
 mod hyperelastic;
@@ -37,6 +39,7 @@ mod user_routine;
 
 pub(crate) use algorithmic_tangent::central_differences;
 pub use elastic::{Elastic, LinearElastic};
+pub use expanding::{Expanding, begin_heating, heat_work};
 pub use generalised_maxwell::GeneralisedMaxwell;
 pub use hardening::{Hardening, JohnsonCook};
 pub use hyperelastic::{NeoHooke, StVenantKirchhoff};
@@ -222,6 +225,11 @@ pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
         past: &[f64],
         present: &mut [f64],
     ) -> LocalResponse<D>;
+
+    /// Which of the numbers that it remembers is its free stretch `α ΔT`, for the owner of a temperature to write before each response; none of a law that does not expand by itself.
+    fn free_stretch(&self) -> Option<usize> {
+        None
+    }
 
     /// Which of the numbers that it remembers is the damage D, by which it loses its stiffness; none of a law that does not.
     fn damage(&self) -> Option<usize> {

@@ -27,15 +27,18 @@ pub struct Reduced<const D: usize> {
     tangent: Tensor4<D>,
 }
 
-/// What is remembered beside the history of the solid, and not shown: the strain out of the body, and the largest gradient so far, which sets the scale of round-off.
-const OWN: [&str; 2] = [""; 2];
+/// Numbers that are remembered beside the history of the solid, and not shown: the strain out of the body, and the largest gradient so far, which sets the scale of round-off.
+const OWN: usize = 2;
 
-/// The names of a solid's history, and [`OWN`].
-fn with_own(solid: &'static [&'static str]) -> &'static [&'static str] {
+/// The names of a history, and so many numbers that are not shown.
+pub(super) fn with_unnamed(
+    history: &'static [&'static str],
+    more: usize,
+) -> &'static [&'static str] {
     static MADE: Mutex<BTreeMap<Vec<&str>, &'static [&'static str]>> = Mutex::new(BTreeMap::new());
+    let names = [history, &vec![""; more]].concat();
     let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
-    made.entry(solid.to_vec())
-        .or_insert_with(|| [solid, &OWN].concat().leak())
+    made.entry(names.clone()).or_insert_with(|| names.leak())
 }
 
 impl<const D: usize> Reduced<D> {
@@ -48,7 +51,7 @@ impl<const D: usize> Reduced<D> {
         };
         let tangent = condensed(law.tangent(), free);
         let history = match law.history() {
-            solid if free < 3 && !solid.is_empty() => with_own(solid),
+            solid if free < 3 && !solid.is_empty() => with_unnamed(solid, OWN),
             solid => solid,
         };
         Self {
@@ -206,6 +209,10 @@ impl<const D: usize> LocalLaw<D> for Reduced<D> {
 
     fn history(&self) -> &'static [&'static str] {
         self.history
+    }
+
+    fn free_stretch(&self) -> Option<usize> {
+        self.law.free_stretch()
     }
 
     fn damage(&self) -> Option<usize> {

@@ -33,16 +33,19 @@ impl<const D: usize> StressSettings<D> {
         let ratio = |m: &Material<D>| Ratio::new(m.lame, kinematics).typed;
         let stiffness = |m: &Material<D>| 2.0 * m.lame.1 * (1.0 + ratio(m));
         let alpha = |m: &Material<D>| m.expansion.unwrap_or(0.0);
-        let within = |m| match kinematics {
-            Kinematics::PlaneStrain => (1.0 + ratio(m)) * alpha(m),
-            Kinematics::Bar | Kinematics::PlaneStress | Kinematics::Solid => alpha(m),
+        let of_solid = |m| match kinematics {
+            Kinematics::PlaneStrain => (1.0 + ratio(m)).recip(),
+            Kinematics::Bar | Kinematics::PlaneStress | Kinematics::Solid => 1.0,
         };
         let cells = scene.mesh.cell_count().max(1);
         let (low, high) = scene.mesh.bounds();
         let size = (high - low).norm() / (cells as f64).powf(1.0 / D as f64);
         let thermal = scene.temperature.as_ref().map(|temperature| Thermal {
             temperature: temperature.clone(),
-            expansion: scene.materials.iter().map(within).collect(),
+            expansion: (scene.materials.iter())
+                .map(|m| alpha(m) / of_solid(m))
+                .collect(),
+            solid: scene.materials.iter().map(of_solid).collect(),
             reach: 0.25 * size,
         });
         Self {

@@ -25,6 +25,8 @@ pub struct Thermal<const D: usize> {
     pub temperature: Temperature,
     /// Expansion per degree of each material within the dimensions of the scene: `(1 + ν) α` in plane strain.
     pub expansion: Vec<f64>,
+    /// Expansion of the solid over that: 1, and 1/(1 + ν) in plane strain.
+    pub solid: Vec<f64>,
     /// Half of the distance over which the temperature is differenced.
     pub reach: f64,
 }
@@ -65,10 +67,12 @@ impl<const D: usize> Thermal<D> {
 
     /// The stretch of points for bonds that know their temperature.
     pub fn free_stretch(&self) -> FreeStretch<D> {
-        let thermal = self.clone();
+        let (of_points, of_cells) = (self.clone(), self.clone());
         FreeStretch {
             varies_in_time: self.temperature.value.depends_on_time(),
-            at: Arc::new(move |x, material, t| thermal.stretch_at(x, material, t)),
+            at: Arc::new(move |x, material, t| of_points.stretch_at(x, material, t)),
+            of_cell: Arc::new(move |model, c, t| of_cells.expanded_nodes(model, c, t)),
+            solid: self.solid.clone(),
         }
     }
 

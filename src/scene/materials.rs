@@ -206,6 +206,7 @@ fn law_and_cells<'a, const D: usize>(
         influence,
         kinematics,
         density,
+        is_heated: spec.thermal_expansion().is_some(),
     };
     Ok(match spec {
         MaterialSpec::BondBased(m) => {

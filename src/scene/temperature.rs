@@ -72,7 +72,7 @@ pub(super) fn agrees<const D: usize>(
                 "`temperature`, and the material `{}` has no thermal-expansion",
                 cold.name
             ),
-            "add thermal-expansion = ... to it, 0 is a number too; bond-based, lps, correspondence, hardening, softening-bond, continuum-damage, viscoelastic-bond and pals take it",
+            "add thermal-expansion = ... to it, 0 is a number too",
         );
     }
     let has_sub_steps = matches!(solve, Solve::Explicit(e) if e.sub_steps.is_some());

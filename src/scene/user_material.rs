@@ -7,7 +7,7 @@ use super::bounds_checks::{not_negative, positive};
 use super::error::{SceneError, SceneErrorKind};
 use super::spec::{EnergiesSpec, StrainsSpec, TangentSpec, UmatSpec};
 use super::value::Text;
-use crate::material::{Reduced, RoutineError, UmatEnergies, UmatSettings, routine_loader};
+use crate::material::{RoutineError, UmatEnergies, UmatSettings, routine_loader};
 use crate::observe::checkpoint::Fingerprint;
 use crate::peridynamics::Law;
 use crate::peridynamics::laws::{Constants, LocalCorrespondence};
@@ -82,7 +82,7 @@ pub(crate) fn umat<const D: usize>(
                 .help("give the routine's name with `symbol`; `nm -D` of the library lists its names"),
         }
     })?;
-    let local = Arc::new(Reduced::new(solid, constants.kinematics));
+    let local = constants.local(solid);
     let control = spec.zero_energy_control as usize;
     let linear = constants.correspondence(stabilisation, control as f64);
     let law = LocalCorrespondence::new("user material (UMAT)", linear, local);

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use crate::{
-    coupling::BrokenBonds,
+    coupling::{BrokenBonds, Model},
     peridynamics::{
         bond_force::{BondKinematics, KernelError, Storage},
         contact::ContactError,
@@ -39,11 +39,19 @@ pub struct BondBehaviour<'a, const D: usize> {
 /// A number of a position, a material and a time.
 pub type StretchOf<const D: usize> = dyn Fn(&Vector<D>, u16, f64) -> f64 + Send + Sync;
 
+/// Displacements of the nodes of a cell of a model at a time.
+pub type CellExpansion<const D: usize> =
+    dyn Fn(&Model<D>, usize, f64) -> Vec<Vector<D>> + Send + Sync;
+
 /// The stretch `α ΔT` by which points expand freely.
 #[derive(Clone)]
 pub struct FreeStretch<const D: usize> {
     /// At a place, of a material's number, at a time.
     pub at: Arc<StretchOf<D>>,
+    /// The displacements \[m\] by which the nodes of a cell expand freely about its centroid, at a time.
+    pub of_cell: Arc<CellExpansion<D>>,
+    /// Stretch of the solid over that within the body, of each material: 1, and 1/(1 + ν) in plane strain.
+    pub solid: Vec<f64>,
     /// Whether it changes with time.
     pub varies_in_time: bool,
 }

@@ -2,14 +2,14 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::behaviour::CHUNK;
+use super::behaviour::{CHUNK, FreeStretch};
 use super::tangent_pattern::TangentPattern;
 use crate::{
     coupling::{CellRole, Model, SiteKind},
     fem::{CellBandError, NonlinearElements},
     material::LocalLaw,
     parallel,
-    system::{ElementTangent, PlaceStress, Symmetry},
+    system::{ElementTangent, Interval, PlaceStress, Symmetry},
     tensor::Vector,
 };
 
@@ -18,6 +18,17 @@ pub(super) struct LocalElements<const D: usize> {
     elements: NonlinearElements<D>,
     /// Where their tangent has blocks; computed with the first one.
     pattern: OnceLock<TangentPattern>,
+    /// How they expand; none if they do not.
+    heat: Option<ElementHeat<D>>,
+}
+
+/// How elements expand, and until when they have.
+struct ElementHeat<const D: usize> {
+    stretch: FreeStretch<D>,
+    /// None where they have not that of a time.
+    time: Option<f64>,
+    /// Whether they keep what they have.
+    is_held: bool,
 }
 
 impl<const D: usize> LocalElements<D> {
@@ -28,6 +39,7 @@ impl<const D: usize> LocalElements<D> {
     pub fn new(
         model: &Model<D>,
         laws: &[Option<Arc<dyn LocalLaw<D>>>],
+        heat: Option<&FreeStretch<D>>,
     ) -> Result<Option<Self>, CellBandError> {
         if laws.iter().all(Option::is_none) {
             return Ok(None);
@@ -52,13 +64,70 @@ impl<const D: usize> LocalElements<D> {
         Ok(elements.map(|elements| Self {
             elements,
             pattern: OnceLock::new(),
+            heat: heat.map(|stretch| ElementHeat {
+                stretch: stretch.clone(),
+                time: None,
+                is_held: false,
+            }),
         }))
     }
 
+    /// Gives them the temperature at a time (none: that without stress) and `part` of the change until another, until they are released.
+    pub fn hold_between(&mut self, model: &Model<D>, (from, to, part): (Option<f64>, f64, f64)) {
+        if let Some(heat) = &mut self.heat {
+            (heat.time, heat.is_held) = (None, true);
+        }
+        self.expand(model, from, (to, part));
+    }
+
+    /// Lets them follow the time of each force again.
+    pub fn release(&mut self) {
+        if let Some(heat) = &mut self.heat {
+            heat.is_held = false;
+        }
+    }
+
+    fn expand(&mut self, model: &Model<D>, from: Option<f64>, (to, part): (f64, f64)) {
+        let Some(ElementHeat { stretch, .. }) = &self.heat else {
+            return;
+        };
+        self.elements.expand(&model.mesh, |cell| {
+            let mut nodes = (stretch.of_cell)(model, cell, to);
+            if part != 1.0 {
+                let before = from.map(|t| (stretch.of_cell)(model, cell, t));
+                for (k, node) in nodes.iter_mut().enumerate() {
+                    let before = before.as_ref().map_or(Vector::zeros(), |b| b[k]);
+                    *node = before + (*node - before) * part;
+                }
+            }
+            let material = usize::from(model.material_of_cell(cell));
+            (nodes, stretch.solid[material])
+        });
+    }
+
+    /// Gives them the temperature at a time, unless they have it.
+    fn follow(&mut self, model: &Model<D>, end: f64) {
+        let Some(heat) = self.heat.as_mut().filter(|heat| !heat.is_held) else {
+            return;
+        };
+        let is_there = |time: f64| time == end || !heat.stretch.varies_in_time;
+        if !heat.time.is_some_and(is_there) {
+            heat.time = Some(end);
+            self.expand(model, None, (end, 1.0));
+        }
+    }
+
     /// Adds to the force of each site what its elements have beyond the linear ones.
-    pub fn add_force(&mut self, model: &Model<D>, u: &[f64], step: f64, force: &mut [f64]) {
+    pub fn add_force(
+        &mut self,
+        model: &Model<D>,
+        u: &[f64],
+        interval: Interval,
+        force: &mut [f64],
+    ) {
+        self.follow(model, interval.end);
         let nodes = |n: u32| model.node_transfer.displacement(n as usize, u);
-        self.elements.respond(&model.mesh, nodes, step);
+        self.elements.respond(&model.mesh, nodes, interval.length);
         parallel::for_each_chunk(force, CHUNK * D, 1, |chunk, force| {
             for (k, force) in force.chunks_exact_mut(D).enumerate() {
                 if let SiteKind::Node(n) = model.sites[chunk * CHUNK + k].kind {

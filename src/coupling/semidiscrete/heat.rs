@@ -54,13 +54,18 @@ impl<const D: usize> PointHeat<D> {
             is_stale: false,
         };
         let heated = pass.heated().ok_or(SystemError::Expansion { law })?;
-        heated.set_free_stretch(&heat.at(0.0));
+        let (free, solid) = heat.at(0.0);
+        heated.set_free_stretch(&free, &solid);
         Ok(heat)
     }
 
-    fn at(&self, t: f64) -> Vec<f64> {
-        let places = self.places.iter();
-        places.map(|(x, m)| (self.stretch.at)(x, *m, t)).collect()
+    /// The free stretch of points, and of the solids that they are made of.
+    fn at(&self, t: f64) -> (Vec<f64>, Vec<f64>) {
+        let of = |(x, m): &(Vector<D>, u16)| {
+            let free = (self.stretch.at)(x, *m, t);
+            (free, free * self.stretch.solid[usize::from(*m)])
+        };
+        self.places.iter().map(of).unzip()
     }
 
     /// Gives the pass that at a time (none: nothing), and `part` of the change until another; the next force asks anew.
@@ -70,12 +75,14 @@ impl<const D: usize> PointHeat<D> {
         pass: &mut dyn BondPass<D>,
     ) {
         let to = self.at(to);
-        let from = from.map_or_else(|| vec![0.0; to.len()], |t| self.at(t));
-        let free: Vec<f64> = (from.iter().zip(&to))
-            .map(|(from, to)| from + part * (to - from))
-            .collect();
+        let nothing = || (vec![0.0; to.0.len()], vec![0.0; to.0.len()]);
+        let from = from.map_or_else(nothing, |t| self.at(t));
+        let between = |from: &[f64], to: &[f64]| -> Vec<f64> {
+            let both = from.iter().zip(to);
+            both.map(|(from, to)| from + part * (to - from)).collect()
+        };
         if let Some(heated) = pass.heated() {
-            heated.set_free_stretch(&free);
+            heated.set_free_stretch(&between(&from.0, &to.0), &between(&from.1, &to.1));
         }
         self.is_held = true;
     }
@@ -89,7 +96,8 @@ impl<const D: usize> PointHeat<D> {
         self.is_stale = false;
         self.time = end;
         if let Some(heated) = pass.heated() {
-            heated.set_free_stretch(&self.at(end));
+            let (free, solid) = self.at(end);
+            heated.set_free_stretch(&free, &solid);
         }
     }
 }

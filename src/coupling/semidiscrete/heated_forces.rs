@@ -11,7 +11,7 @@ const PART: f64 = 1e-3;
 
 impl<const D: usize> CoupledSystem<'_, D> {
     /// Whether the bonds that are passed over know their temperature.
-    pub fn is_heated(&self) -> bool {
+    pub fn has_heated_bonds(&self) -> bool {
         self.body.as_ref().is_some_and(|body| body.heat.is_some())
     }
 
@@ -23,7 +23,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
         from: Option<f64>,
         to: f64,
     ) -> bool {
-        if !self.is_heated() {
+        if !self.has_heated_bonds() && (self.heat.is_none() || self.elements.is_none()) {
             return false;
         }
         let at_once = Interval {
@@ -37,10 +37,16 @@ impl<const D: usize> CoupledSystem<'_, D> {
             {
                 heat.set_between((from, to, part), body.pass.as_mut());
             }
+            if let Some(elements) = &mut self.elements {
+                elements.hold_between(self.model, (from, to, part));
+            }
             self.internal_force_into(u, force, at_once, FailureUpdate::Frozen);
         }
         if let Some(heat) = self.body.as_mut().and_then(|body| body.heat.as_mut()) {
             (heat.is_held, heat.is_stale) = (false, true);
+        }
+        if let Some(elements) = &mut self.elements {
+            elements.release();
         }
         for (force, further) in force.iter_mut().zip(further) {
             *force += (further - *force) / PART;

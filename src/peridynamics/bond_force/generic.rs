@@ -282,7 +282,7 @@ impl<const D: usize> Generic<D> {
                 BondKinematics::Exact => (extension::<true>(t), ratio::<true>(t)),
                 BondKinematics::Linear => (extension::<false>(t), ratio::<false>(t)),
             };
-            let (e, eta) = match self.free_stretch(i, j) {
+            let (e, eta) = match self.taken_stretch(i, j) {
                 Some(free) => (e - free, eta - self.xi(i, j) * free),
                 None => (e, eta),
             };
@@ -457,6 +457,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
             self.respond_points(&mut points, u, interval);
             self.gather_points(&points, u, force);
             self.points = Some(points);
+            self.begin_heat();
             return self.last.len() as u64;
         }
         self.respond_all(u, interval.length);
@@ -469,6 +470,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
     }
 
     fn commit(&mut self) -> f64 {
+        self.sum_heat_of_points();
         self.past.clone_from(&self.present);
         self.sum_heat();
         if let Some(drag) = self.points.as_mut().and_then(|p| p.drag.as_mut()) {
@@ -565,10 +567,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
     }
 
     fn heated(&mut self) -> Option<&mut dyn super::HeatedBonds> {
-        match self.points.is_none() {
-            true => Some(self),
-            false => None,
-        }
+        Some(self)
     }
 
     fn force_states(&self) -> Option<&dyn ForceStates<D>> {

@@ -171,7 +171,7 @@ pub trait BondPass<const D: usize>: Send + Sync {
     /// The pass as one that may leave points to others; none where it computes all of them together.
     fn own_points(&mut self) -> Option<&mut dyn OwnPoints>;
 
-    /// The pass as one whose bonds know a temperature; none of an accelerator, and of laws whose points have a stress.
+    /// The pass as one whose bonds know a temperature; none of an accelerator.
     fn heated(&mut self) -> Option<&mut dyn HeatedBonds> {
         None
     }
@@ -185,8 +185,8 @@ pub trait BondPass<const D: usize>: Send + Sync {
 
 /// A pass whose bonds know a temperature.
 pub trait HeatedBonds {
-    /// Sets the stretch `α ΔT` by which each point expands freely; a bond has the mean of its ends. Forces, energies and criteria are those of what is left of its stretch.
-    fn set_free_stretch(&mut self, free: &[f64]);
+    /// Sets the stretch `α ΔT` by which each point expands freely; a bond has the mean of its ends. Forces, energies and criteria are those of what is left of its stretch. `solid` is the stretch of the solid that each point is made of, which its local law takes: in plane strain it is smaller.
+    fn set_free_stretch(&mut self, free: &[f64], solid: &[f64]);
 
     /// The work that changes of the free stretch have done since it was last asked for \[J\], up to the last [`BondPass::commit`].
     fn take_heat_work(&mut self) -> f64;

@@ -19,6 +19,7 @@ pub(super) const CONSTANTS: Constants = Constants {
     influence: Influence::Gaussian,
     kinematics: crate::material::Kinematics::Solid,
     density: 2.5,
+    is_heated: false,
 };
 
 /// Speed of the fastest waves.

@@ -42,6 +42,7 @@ fn points_that_flow_under_a_constant_triaxiality_fail_at_the_integral_of_the_tea
         influence: crate::peridynamics::Influence::Gaussian,
         kinematics: crate::material::Kinematics::Solid,
         density: 1.0,
+        is_heated: false,
     };
     let bulk = lambda + 2.0 / 3.0 * shear;
     let named = laws::Named::PlasticCorrespondence;

@@ -36,6 +36,7 @@ impl Point {
             influence: Influence::Gaussian,
             kinematics: Kinematics::Solid,
             density: 1.0,
+            is_heated: false,
         };
         // the normal of the weak planes is x
         let values = [ONSET, eta, weakness, 0.0, 0.0];

@@ -4,9 +4,7 @@ use std::sync::Arc;
 
 use super::{Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio};
 use crate::{
-    material::{
-        EquivalentStrain, Kinematics, Reduced, ScalarDamage, ScalarDamageSettings, SofteningCurve,
-    },
+    material::{EquivalentStrain, Kinematics, ScalarDamage, ScalarDamageSettings, SofteningCurve},
     peridynamics::Law,
 };
 
@@ -70,7 +68,7 @@ impl<const D: usize> NamedLaw<D> for DamageCorrespondence<D> {
                 false => EquivalentStrain::Mazars,
             },
         });
-        let local = Arc::new(Reduced::new(Arc::new(solid), constants.kinematics));
+        let local = constants.local(Arc::new(solid));
         let linear = constants.correspondence(values[4], values[5]);
         Arc::new(LocalCorrespondence::new(
             "damage correspondence",
@@ -113,6 +111,7 @@ mod tests {
             influence: Influence::Gaussian,
             kinematics: Kinematics::Solid,
             density: 1.0,
+            is_heated: false,
         };
         let law =
             DamageCorrespondence::<3>::build(constants, &[STRENGTH, ENERGY, 0.0, 1.0, 0.0, 0.0]);

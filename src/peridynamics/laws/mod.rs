@@ -42,7 +42,7 @@ mod viscoelastic;
 
 use std::sync::Arc;
 
-use crate::material::Kinematics;
+use crate::material::{Expanding, Kinematics, LocalLaw, Reduced};
 use crate::peridynamics::{Influence, Law, ZeroEnergyControl, force_state::PLASTIC_STRAIN};
 
 pub use bond_based::BondBased;
@@ -123,6 +123,8 @@ pub struct Constants {
     pub kinematics: Kinematics,
     /// Density ρ [kg/m^D].
     pub density: f64,
+    /// Whether the body has a temperature, by which local laws expand.
+    pub is_heated: bool,
 }
 
 impl Constants {
@@ -134,6 +136,15 @@ impl Constants {
     ) -> Correspondence<D> {
         Correspondence::new(self.influence, self.lambda, self.shear, stabilisation)
             .with_control(ZeroEnergyControl::of_place(control as usize), self.density)
+    }
+
+    /// The law of a solid in these kinematics, expanding where the body has a temperature.
+    pub fn local<const D: usize>(&self, solid: Arc<dyn LocalLaw<3>>) -> Arc<dyn LocalLaw<D>> {
+        let solid = match self.is_heated {
+            true => Arc::new(Expanding::new(solid)),
+            false => solid,
+        };
+        Arc::new(Reduced::new(solid, self.kinematics))
     }
 
     /// Lamé's λ of the solid of which the body is made \[Pa\].
@@ -188,6 +199,7 @@ pub(crate) fn every<const D: usize>() -> Vec<Arc<dyn Law<D>>> {
             _ => Kinematics::Solid,
         },
         density: 1.0,
+        is_heated: false,
     };
     let Constants { lambda, shear, .. } = constants;
     let typed: [Arc<dyn Law<D>>; 3] = [
@@ -255,6 +267,7 @@ fn mixtures<const D: usize>() -> impl Iterator<Item = Arc<dyn Law<D>>> {
                 _ => Kinematics::Solid,
             },
             density: 1.0,
+            is_heated: false,
         };
         let law = Named::PlasticCorrespondence;
         let mut values: Vec<f64> = law.parameters().iter().map(|p| p.usual).collect();
@@ -339,13 +352,6 @@ macro_rules! named_laws {
                 self.usual().damages()
             }
 
-            /// Whether its bonds may expand freely: its force states follow from their extensions alone, and its elements are linear.
-            pub fn expands(self) -> bool {
-                let law = self.usual();
-                let states = law.force_state();
-                states.is_some_and(|states| states.correspondence(None).is_none()) && law.local_law().is_none()
-            }
-
             /// Whether its points remember a plastic strain.
             pub fn flows(self) -> bool {
                 let law = self.usual();
@@ -361,6 +367,7 @@ macro_rules! named_laws {
                     influence: Influence::Gaussian,
                     kinematics: Kinematics::Bar,
                     density: 1.0,
+                    is_heated: false,
                 };
                 let values: Vec<f64> = self.parameters().iter().map(|p| p.usual).collect();
                 self.build::<1>(constants, &values)

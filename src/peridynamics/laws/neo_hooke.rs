@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio};
 use crate::{
-    material::{Kinematics, NeoHooke, Reduced},
+    material::{Kinematics, NeoHooke},
     peridynamics::Law,
 };
 
@@ -26,7 +26,7 @@ impl<const D: usize> NamedLaw<D> for NeoHookeSolid<D> {
     fn build(constants: Constants, values: &[f64]) -> Arc<dyn Law<D>> {
         let shear = constants.shear;
         let solid = Arc::new(NeoHooke::new(constants.solid_lambda(), shear));
-        let local = Arc::new(Reduced::new(solid, constants.kinematics));
+        let local = constants.local(solid);
         let linear = constants.correspondence(values[0], values[1]);
         Arc::new(LocalCorrespondence::new(
             "Neo-Hooke correspondence",

@@ -202,6 +202,7 @@ mod tests {
             influence: Influence::Gaussian,
             kinematics: Kinematics::Solid,
             density: 1.0,
+            is_heated: false,
         };
         let linear = PositionAwareSolid::<3>::of(constants, 0.0);
         let series = PronySeries::new(vec![(0.0, 0.7)]);

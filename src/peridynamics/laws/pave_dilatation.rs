@@ -174,6 +174,7 @@ mod tests {
             influence: Influence::Gaussian,
             kinematics: Kinematics::Solid,
             density: 1.0,
+            is_heated: false,
         };
         follows::<3>(Kinematics::Solid, constants(solid));
         follows::<2>(Kinematics::PlaneStrain, constants(solid));

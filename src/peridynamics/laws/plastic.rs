@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio};
 use crate::{
-    material::{Hardening, J2, Kinematics, LocalLaw, LogarithmicJ2, Reduced},
+    material::{Hardening, J2, Kinematics, LocalLaw, LogarithmicJ2},
     peridynamics::Law,
 };
 
@@ -102,25 +102,13 @@ pub(super) fn plastic<const D: usize>(
     (stabilisation, control): (f64, f64),
     is_large: bool,
 ) -> Arc<dyn Law<D>> {
-    let Constants {
-        lambda,
-        shear,
-        kinematics,
-        ..
-    } = constants;
-    let of_solid = || (constants.solid_lambda(), shear, hardening);
-    let local: Arc<dyn LocalLaw<D>> = match kinematics {
-        _ if is_large => {
-            let (lambda, shear, hardening) = of_solid();
-            let solid = LogarithmicJ2::new(lambda, shear, hardening);
-            Arc::new(Reduced::new(Arc::new(solid), kinematics))
-        }
-        Kinematics::PlaneStress => {
-            let (lambda, shear, hardening) = of_solid();
-            let solid = J2::<3>::with_hardening(lambda, shear, hardening);
-            Arc::new(Reduced::new(Arc::new(solid), kinematics))
-        }
-        _ => Arc::new(J2::<D>::with_hardening(lambda, shear, hardening)),
+    let shear = constants.shear;
+    let solid = constants.solid_lambda();
+    let has_own = J2::<D>::KINEMATICS.contains(&constants.kinematics) && !constants.is_heated;
+    let local: Arc<dyn LocalLaw<D>> = match is_large {
+        true => constants.local(Arc::new(LogarithmicJ2::new(solid, shear, hardening))),
+        false if has_own => Arc::new(J2::with_hardening(constants.lambda, shear, hardening)),
+        false => constants.local(Arc::new(J2::with_hardening(solid, shear, hardening))),
     };
     let linear = constants.correspondence(stabilisation, control);
     Arc::new(LocalCorrespondence::new(name, linear, local))

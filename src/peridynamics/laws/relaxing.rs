@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Constants, Parameter};
-use crate::material::{GeneralisedMaxwell, LocalLaw, PronySeries, Reduced};
+use crate::material::{GeneralisedMaxwell, LocalLaw, PronySeries};
 
 /// Numbers that the arms of a series take.
 pub(super) const NUMBERS: usize = 2 * PronySeries::ARMS;
@@ -106,5 +106,5 @@ pub(super) fn local<const D: usize>(
     series: PronySeries,
 ) -> Arc<dyn LocalLaw<D>> {
     let solid = GeneralisedMaxwell::new(constants.solid_lambda(), constants.shear, series);
-    Arc::new(Reduced::new(Arc::new(solid), constants.kinematics))
+    constants.local(Arc::new(solid))
 }

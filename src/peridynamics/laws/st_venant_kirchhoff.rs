@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio};
 use crate::{
-    material::{Kinematics, Reduced, StVenantKirchhoff},
+    material::{Kinematics, StVenantKirchhoff},
     peridynamics::Law,
 };
 
@@ -25,7 +25,7 @@ impl<const D: usize> NamedLaw<D> for StVenantKirchhoffSolid<D> {
     fn build(constants: Constants, values: &[f64]) -> Arc<dyn Law<D>> {
         let shear = constants.shear;
         let solid = Arc::new(StVenantKirchhoff::new(constants.solid_lambda(), shear));
-        let local = Arc::new(Reduced::new(solid, constants.kinematics));
+        let local = constants.local(solid);
         let linear = constants.correspondence(values[0], values[1]);
         Arc::new(LocalCorrespondence::new(
             "St Venant–Kirchhoff correspondence",

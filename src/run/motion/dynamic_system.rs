@@ -252,7 +252,13 @@ fn tell_bonds<const D: usize>(
             why: breaks + at_seam,
         });
     }
-    if motion.is_heated() {
+    let states = model
+        .peridynamics
+        .as_ref()
+        .and_then(|p| p.law.force_state());
+    // local laws know the temperature of their point, however it is passed over
+    let by_bonds = states.is_some_and(|states| states.correspondence(None).is_none());
+    if motion.has_heated_bonds() && by_bonds {
         choices.push(Decision {
             choice: "force states of bonds one by one".to_owned(),
             why: "temperature: laws and criteria see the stretch beyond free expansion, which the faster passes do not know".to_owned(),

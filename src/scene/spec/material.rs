@@ -41,7 +41,7 @@ impl MaterialSpec {
             Self::Lps(m) => m.thermal_expansion.as_ref(),
             Self::Named(m) => m.thermal_expansion.as_ref(),
             Self::Correspondence(m) => m.thermal_expansion.as_ref(),
-            Self::Umat(_) => None,
+            Self::Umat(m) => m.thermal_expansion.as_ref(),
         }
     }
 }

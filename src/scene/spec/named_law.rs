@@ -21,7 +21,7 @@ pub struct NamedSpec {
     pub poisson_ratio: Option<Number>,
     /// Density.
     pub density: Option<Number>,
-    /// Linear thermal expansion per degree, of a law that has any.
+    /// Linear thermal expansion per degree.
     pub thermal_expansion: Option<Number>,
     /// Energy per area of a new crack.
     pub fracture_energy: Option<Number>,
@@ -88,7 +88,6 @@ fn takes(law: Named, key: &str) -> bool {
         "fracture-energy" => law.has_bond_energy(),
         "critical-stretch" => law.has_breakable_bonds(),
         "tearing-parameter" => law.flows(),
-        "thermal-expansion" => law.expands(),
         _ => true,
     }
 }

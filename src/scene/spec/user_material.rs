@@ -22,6 +22,9 @@ pub struct UmatSpec {
     /// Density.
     #[serde(default)]
     pub density: Option<Number>,
+    /// Linear thermal expansion α per degree, with `[temperature]`: the routine gets the strain that is left.
+    #[serde(default)]
+    pub thermal_expansion: Option<Number>,
     /// PROPS, the numbers that the routine takes.
     #[serde(default)]
     pub constants: Vec<Number>,
