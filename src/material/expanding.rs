@@ -54,6 +54,10 @@ impl LocalLaw<3> for Expanding {
         self.law.is_objective()
     }
 
+    fn is_path_dependent(&self) -> bool {
+        self.law.is_path_dependent()
+    }
+
     fn flows_at_constant_volume(&self) -> bool {
         self.law.flows_at_constant_volume()
     }

@@ -214,6 +214,11 @@ pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
     /// The names of the numbers that it remembers; all are zero at the start. Those without a name are not shown.
     fn history(&self) -> &'static [&'static str];
 
+    /// Whether the response depends on how the deformation came about; a temperature that it is told does not count.
+    fn is_path_dependent(&self) -> bool {
+        !self.history().is_empty()
+    }
+
     /// Whether it flows without a change of volume, so that cells with a dilatation at each quadrature point would resist it.
     fn flows_at_constant_volume(&self) -> bool;
 

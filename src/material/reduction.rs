@@ -202,6 +202,10 @@ impl<const D: usize> LocalLaw<D> for Reduced<D> {
         self.law.is_objective()
     }
 
+    fn is_path_dependent(&self) -> bool {
+        self.law.is_path_dependent()
+    }
+
     fn flows_at_constant_volume(&self) -> bool {
         // the thickness, or the sides, make up for the rest
         self.free == 3 && self.law.flows_at_constant_volume()

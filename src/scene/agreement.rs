@@ -216,13 +216,10 @@ fn remembering<'a, const D: usize>(
     cell_material: &[u16],
     zones: &[Zone],
 ) -> Option<&'a Material<D>> {
-    let by_points = |m: &Material<D>| {
-        let states = m.law.force_state();
-        states.is_some_and(|states| !states.history().is_empty())
-    };
+    let by_points = |m: &Material<D>| m.law.is_path_dependent();
     let by_elements = |m: &Material<D>| {
         let law = m.law.local_law();
-        law.is_some_and(|law| !law.history().is_empty())
+        law.is_some_and(|law| law.is_path_dependent())
     };
     let mut used = zones.iter().zip(cell_material);
     let remembers = |(zone, m): &(&Zone, &u16)| match zone {

@@ -229,7 +229,12 @@ impl<'a, const D: usize> Draft<'a, D> {
         elements: ElementsSpec,
     ) -> Result<(), SceneError> {
         let (spec, materials) = (self.spec, &self.materials);
-        temperature::agrees(spec, materials, (coupling, elements), &self.solve)
+        temperature::agrees(
+            (spec, self.kinematics),
+            materials,
+            (coupling, elements),
+            &self.solve,
+        )
     }
 
     /// The scene with the coupling that it names, or with another one `instead`; and the coupling to go on with if that one turns out not to hold.

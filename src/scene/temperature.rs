@@ -8,7 +8,9 @@ use super::solve::{Clock, Solve};
 use super::spec::{
     CouplingSpec, CutBondsSpec, ElementsSpec, MaterialSpec, SceneSpec, TemperatureSpec,
 };
+use crate::material::Kinematics;
 use crate::mesh::Mesh;
+use crate::peridynamics::laws::Named;
 use crate::tensor::padded;
 
 /// A temperature in space and time.
@@ -53,7 +55,7 @@ pub(super) fn temperature<const D: usize>(
 
 /// Refuses a temperature where its strain is not known to a law, a bond or a seam.
 pub(super) fn agrees<const D: usize>(
-    spec: &SceneSpec,
+    (spec, kinematics): (&SceneSpec, Kinematics),
     materials: &[Material<D>],
     (coupling, elements): (&CouplingSpec, ElementsSpec),
     solve: &Solve,
@@ -73,6 +75,19 @@ pub(super) fn agrees<const D: usize>(
                 cold.name
             ),
             "add thermal-expansion = ... to it, 0 is a number too",
+        );
+    }
+    let relaxes = |m: &MaterialSpec| {
+        let law = Named::PositionAwareViscoelasticSolid;
+        matches!(m, MaterialSpec::Named(named) if named.law == law)
+    };
+    let mut relaxing = spec.materials.iter().filter(|(_, m)| relaxes(m));
+    if let (Kinematics::PlaneStrain, Some((name, _))) = (kinematics, relaxing.next()) {
+        return refuse(
+            format!(
+                "`temperature`, and the material `{name}`, `pave`, in plane strain: what is held across the plane relaxes, and with it the expansion within, which its bonds do not know"
+            ),
+            "use viscoelastic-correspondence, or kinematics = \"solid\"",
         );
     }
     let has_sub_steps = matches!(solve, Solve::Explicit(e) if e.sub_steps.is_some());

@@ -136,6 +136,14 @@ probes.p.at = {probe}
     )
 }
 
+/// The scene without its temperature.
+fn cold(text: &str) -> String {
+    let expands = format!(", thermal-expansion = {ALPHA:?}");
+    let lines = text.lines().filter(|line| !line.starts_with("temperature"));
+    let lines = lines.collect::<Vec<_>>().join("\n");
+    lines.replace(&expands, "")
+}
+
 /// The stress at the probe in the end.
 fn stress(text: &str, way: Way) -> Vec<(String, f64)> {
     let done = run(text, &[]);
@@ -190,12 +198,15 @@ fn check(kinematics: Kinematics) {
                 };
                 for (stretch, held) in [(free, false), (HELD, true)] {
                     let text = scene(kinematics, stuff, coupling, bonds, (way, stretch, held));
-                    // a position-aware solid that relaxes has no truncated bonds
-                    let is_offered = (stuff.key, coupling) != ("pave", "truncated");
+                    // a position-aware solid that relaxes has no truncated bonds, and does not expand in plane strain
+                    let is_offered = stuff.key != "pave"
+                        || (coupling != "truncated" && kinematics != Kinematics::PlaneStrain);
                     let has_changed = relaxes && (held || across_the_plane(kinematics, way));
-                    if has_changed || !is_offered || read(&text, &[]).is_err() {
+                    if has_changed || !is_offered || read(&cold(&text), &[]).is_err() {
                         continue;
                     }
+                    // what runs without a temperature runs with it
+                    read(&text, &[]).unwrap();
                     ran += 1;
                     for (component, found) in stress(&text, way) {
                         let wanted = closed(kinematics, stuff.poisson, &component, stretch, held);
@@ -213,7 +224,8 @@ fn check(kinematics: Kinematics) {
                 }
             }
         }
-        assert!(ran > 0, "{}", stuff.text);
+        let is_left_out = stuff.key == "pave" && kinematics == Kinematics::PlaneStrain;
+        assert_eq!(ran > 0, !is_left_out, "{}", stuff.text);
     }
 }
 

@@ -6,6 +6,7 @@ use bondline::run::AnyScene;
 use bondline::scene::Source;
 
 mod heated_bonds;
+mod heated_flow;
 mod heated_laws;
 mod mirrored;
 mod pressure;

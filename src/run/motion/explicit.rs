@@ -171,7 +171,7 @@ fn balance_of<const D: usize>(
     is_proved: bool,
     is_linear: bool,
 ) -> Balance {
-    if energies_are_apart(model, rest.stresses.thermal.is_some(), is_linear) {
+    if energies_are_apart(model, rest, is_linear) {
         return Balance::Apart;
     }
     let points = model.peridynamics.as_ref();

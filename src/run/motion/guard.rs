@@ -14,6 +14,7 @@ use crate::coupling::Model;
 use crate::observe::summary::{Ended, EnergyGain, Rotation};
 use crate::run::linear_parts::LinearParts;
 use crate::run::rotation::Rotations;
+use crate::run::setup::RunSettings;
 use crate::scene::solve::Explicit as Spec;
 
 /// Steps between two looks, at least.
@@ -45,15 +46,17 @@ impl Balance {
     }
 }
 
-/// Whether energies of elements and of heated bonds stand side by side, so that they do not balance.
+/// Whether energies that do not balance stand side by side: of linear elements the thermal forces do work as loads do, of heated bonds and of local laws the temperature does.
 pub(crate) fn energies_are_apart<const D: usize>(
     model: &Model<D>,
-    is_heated: bool,
+    rest: &RunSettings<D>,
     is_linear: bool,
 ) -> bool {
     let cells = 0..model.mesh.cell_count();
     let has_elements = || cells.into_iter().any(|c| model.is_element(c));
-    is_heated && !is_linear && model.body().is_some() && has_elements()
+    let knows_heat = model.body().is_some() || rest.has_nonlinear_elements(model);
+    let is_heated = rest.stresses.thermal.is_some() && !is_linear;
+    is_heated && knows_heat && has_elements()
 }
 
 /// The limits of a run, and what was seen of them.

@@ -132,7 +132,7 @@ fn load_steps<const D: usize>(
         factorisations: 0,
         edge,
         ended: ended_before(edge, rest),
-        energies_are_apart: energies_are_apart(model, thermal.is_some(), is_linear),
+        energies_are_apart: energies_are_apart(model, rest, is_linear),
         rotation: None,
         failed: None,
     };
