@@ -309,6 +309,11 @@ pub trait SemiDiscrete: Send + Sync {
         None
     }
 
+    /// Mean stored energy per volume of a cell whose law is not linear \[J/m^D\]; none of any other.
+    fn energy_of_cell(&self, _cell: usize, _u: &[f64]) -> Option<f64> {
+        None
+    }
+
     /// What the local laws of finite elements remember, by name and cell.
     fn remembered_by_cells(&self) -> Vec<(&'static str, Vec<(u32, f64)>)> {
         Vec::new()

@@ -263,6 +263,11 @@ fn the_additions_of_the_page_build_and_run() {
         "{thrust}"
     );
 
+    run("mean_stress.toml", &[]);
+    let line = table(&copied.join("out/mean_stress_middle.csv"));
+    let mean = &line["mean_stress"];
+    assert!(mean.iter().all(|m| (m - 10.0).abs() < 1e-7), "{mean:?}");
+
     run("dashpot.toml", &[]);
     let history = table(&copied.join("out/dashpot_history.csv"));
     let [first, last] = ["stored_energy", "dissipated_energy"].map(|name| &history[name]);

@@ -505,6 +505,10 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         self.elements.as_ref()?.stress(self.model, cell, u)
     }
 
+    fn energy_of_cell(&self, cell: usize, u: &[f64]) -> Option<f64> {
+        self.elements.as_ref()?.energy(self.model, cell, u)
+    }
+
     fn remembered_by_cells(&self) -> Vec<(&'static str, Vec<(u32, f64)>)> {
         let elements = self.elements.as_ref();
         elements.map_or(Vec::new(), |e| e.remembered(self.model))

@@ -46,6 +46,8 @@ struct Element {
 struct Excess<const D: usize> {
     /// Stored energy less that of the linear element \[J\].
     stored: f64,
+    /// Stored energy \[J\].
+    energy: f64,
     /// Energy dissipated within the interval \[J\].
     dissipated: f64,
     /// Integral of the Cauchy stress over the undeformed cell.
@@ -61,6 +63,7 @@ impl<const D: usize> Excess<D> {
     fn zero() -> Self {
         Self {
             stored: 0.0,
+            energy: 0.0,
             dissipated: 0.0,
             stress: Tensor::zeros(),
             across: 0.0,
@@ -265,6 +268,18 @@ impl<const D: usize> NonlinearElements<D> {
         Some((found.stress / found.volume, found.across / found.volume))
     }
 
+    /// The mean stored energy per volume of a cell \[J/m^D\], likewise.
+    pub fn energy_density(
+        &self,
+        mesh: &Mesh<D>,
+        cell: usize,
+        displacement: impl Fn(u32) -> Vector<D>,
+    ) -> Option<f64> {
+        let e = (self.elements).binary_search_by_key(&cell, |e| e.cell as usize);
+        let found = self.of_element(mesh, &displacement, &self.elements[e.ok()?]);
+        Some(found.energy / found.volume)
+    }
+
     /// What an element has beyond the linear one, with what was committed last.
     fn of_element(
         &self,
@@ -446,6 +461,7 @@ fn excess<const D: usize>(
             }
         }
         sum.stored += p.weight * (found.stored - 0.5 * linear.dot(&mechanical));
+        sum.energy += p.weight * found.stored;
         sum.dissipated += p.weight * found.dissipated;
         sum.stress += found.cauchy(&taken, is_objective) * p.weight;
         sum.across += found.across * p.weight;

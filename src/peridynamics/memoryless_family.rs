@@ -46,16 +46,16 @@ impl<const D: usize> MemorylessFamily<'_, D> {
         })
     }
 
-    /// The Cauchy stress of exact bonds, [`ForceState::stress`], likewise; bonds expand freely by the stretches `free`.
+    /// The Cauchy stress of exact bonds, [`ForceState::stress`], and their stored energy density, likewise; bonds expand freely by the stretches `free`.
     pub fn cauchy_stress(
         &self,
         law: &dyn ForceState<D>,
         difference: &[Vector<D>],
         free: &[f64],
-    ) -> CauchyStress<D> {
+    ) -> (CauchyStress<D>, f64) {
         let exact = BondKinematics::Exact;
-        self.deformed(law, exact, difference, free, |family, force, _| {
-            law.stress(family, NO_PAST, force)
+        self.deformed(law, exact, difference, free, |family, force, energy| {
+            (law.stress(family, NO_PAST, force), energy.stored)
         })
     }
 

@@ -31,7 +31,6 @@ use crate::run::motion::writer::{Moment, Recorder};
 use crate::run::proof::growth::{GrowthQuestion, free_start};
 use crate::run::setup::RunSettings;
 use crate::run::solution::{self, Solved};
-use crate::run::write::OverSites;
 use crate::run::{RunError, RunOptions};
 use crate::scene::spec::LoadStepSpec;
 use crate::scene::{Explicit as Spec, QuasiStatic, Solve};
@@ -229,6 +228,8 @@ impl OutputCost {
                 model,
                 operator,
                 displacement: &u,
+                velocity: Some(&u),
+                damage: None,
                 residual: &[],
                 zone_of_site: &solution::zone_of_site(model),
                 system: None,
@@ -237,8 +238,7 @@ impl OutputCost {
                 stresses: (&rest.stresses, 0.0),
             };
             let mut series = Series::new(folder.path(), "trial");
-            let more = [OverSites::Vector("velocity", &u)];
-            file_seconds(&solved, &more, rest.output.points, count, |s| {
+            file_seconds(&solved, rest.output.points, count, |s| {
                 series.push(0.0, s).map(drop)
             })?
         } else {

@@ -7,7 +7,7 @@ use std::time::Instant;
 use crate::observe::ObserveError;
 use crate::observe::vtu::{Compression, Snapshot, write_vtu};
 use crate::run::solution::Solved;
-use crate::run::write::{OverSites, Shown, snapshot, write};
+use crate::run::write::{Shown, snapshot, write};
 use crate::scene::Output;
 use crate::scene::spec::PointOutputSpec;
 
@@ -64,7 +64,6 @@ pub(crate) fn made_up(dofs: usize) -> Vec<f64> {
 /// [`ObserveError`] if nothing can be written, as a run would.
 pub(crate) fn file_seconds<const D: usize>(
     solved: &Solved<'_, D>,
-    more: &[OverSites<'_>],
     points: PointOutputSpec,
     files: f64,
     mut write: impl FnMut(Snapshot) -> Result<(), ObserveError>,
@@ -73,7 +72,7 @@ pub(crate) fn file_seconds<const D: usize>(
     let mut trial = |wanted: f64| -> Result<(f64, f64), ObserveError> {
         let every = (all / wanted).floor().max(1.0);
         let begun = Instant::now();
-        write(snapshot(solved, more, points, Shown::Every(every as usize)))?;
+        write(snapshot(solved, &[], points, Shown::Every(every as usize)))?;
         Ok((all / every, begun.elapsed().as_secs_f64()))
     };
     // the first of all makes the folder
@@ -104,7 +103,7 @@ pub(crate) fn output_seconds<const D: usize>(
     let mut seconds = 0.0;
     if output.vtu {
         let path = folder.path().join("trial.vtu");
-        seconds += file_seconds(solved, &[], output.points, 1.0, |s| {
+        seconds += file_seconds(solved, output.points, 1.0, |s| {
             write_vtu(&path, &s, Compression::default())
         })?;
     }

@@ -258,6 +258,8 @@ fn seconds_of_output<const D: usize>(
         model,
         operator,
         displacement: &displacement,
+        velocity: None,
+        damage: None,
         residual: &displacement,
         zone_of_site: &zones,
         system: None,

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::budget;
 use super::chosen::with_choice;
 use super::error::RunError;
+use super::fields;
 use super::motion::{self, RunOptions};
 use super::placed_scene::PlacedScene;
 use super::statics;
@@ -69,6 +70,24 @@ pub enum AnyScene {
     Solid(Box<PlacedScene<3>>),
 }
 
+/// Refuses the name of a field that there is not.
+fn known_fields(spec: &SceneSpec) -> Result<(), SceneError> {
+    let known = fields::asked_by("output.fields");
+    let unknown = |name: &&crate::scene::Text| !known.contains(&name.value.as_str());
+    let Some(name) = spec.output.fields.iter().find(unknown) else {
+        return Ok(());
+    };
+    Err(SceneError::new(
+        SceneErrorKind::WrongValue,
+        format!("`output.fields` names `{name}`, which is no field to ask for"),
+    )
+    .label(name.span.clone(), "not known")
+    .help(format!(
+        "known are {}; `bondline fields` lists all, and the keys of those that have one of their own",
+        known.join(", ")
+    )))
+}
+
 impl AnyScene {
     /// Reads and validates a scene file with overrides `key=value`.
     ///
@@ -111,6 +130,7 @@ impl AnyScene {
     /// A [`SceneError`] with place, value and remedy.
     pub fn complete(source: &Source, directory: &Path, name: &str) -> Result<Self, SceneError> {
         let spec = SceneSpec::parse(source)?;
+        known_fields(&spec).map_err(|error| error.shown_in(source))?;
         let print = source.fingerprint()?;
         let found = match spec.kinematics.get_ref() {
             KinematicsSpec::Bar => {

@@ -16,7 +16,9 @@
 //! | `solution_samples.rs` | a solution along lines and at probes, as tables |
 //! | `samples.rs` | displacements of a static scene at places, for studies of convergence |
 //! | `linear.rs` | the model alone, for studies of stiffness, eigenvalues and waves |
-//! | `stresses.rs`, `stress_settings.rs`, `stress_probes.rs` | stress as outputs show it, and with each row of a history |
+//! | `fields/` | fields of a solution, which files and tables have |
+//! | `field_probes.rs` | fields at probes with each row of a history |
+//! | `stresses.rs`, `stress_settings.rs` | stress as outputs show it |
 //! | `thermal.rs` | the force on each site that a change of temperature gives |
 //! | `condition_terms.rs` | forces of conditions that depend on the displacement, on the sites of a model |
 //! | `sections.rs` | force and moment that the part of the body beyond a plane exerts on the rest |
@@ -37,6 +39,8 @@ mod condition_terms;
 mod definiteness;
 pub mod equilibrium;
 pub(crate) mod error;
+mod field_probes;
+pub mod fields;
 mod linear;
 mod linear_parts;
 pub mod loads;
@@ -55,7 +59,6 @@ pub mod setup;
 pub mod solution;
 mod solution_samples;
 mod statics;
-mod stress_probes;
 mod stress_settings;
 mod stresses;
 mod surface_gradient;

@@ -13,6 +13,10 @@ pub struct Solved<'a, const D: usize> {
     pub operator: &'a dyn Operator<D>,
     /// Displacement, `D` numbers per site.
     pub displacement: &'a [f64],
+    /// Velocity, likewise; none of a scene without time.
+    pub velocity: Option<&'a [f64]>,
+    /// Damage of each site; none where nothing can break.
+    pub damage: Option<&'a [f64]>,
     /// Residual `K u − f` of each dof; on prescribed dofs the reaction.
     pub residual: &'a [f64],
     /// Which zone each site lies in.

@@ -2,13 +2,14 @@
 
 use rustc_hash::FxHashSet;
 
+use super::fields::columns::{self, Rows};
+use super::fields::place::{Place, Shared};
 use super::solution::Solved;
-use super::stresses::{Expansions, Stress, names};
 use crate::fem::{self, Locator};
-use crate::scene::validated::StressOutput;
+use crate::scene::validated::FieldChoice;
 use crate::shape::Shape;
 use crate::system::Ranks;
-use crate::tensor::{Tensor, Vector, strain};
+use crate::tensor::{Tensor, Vector};
 use crate::{
     coupling::{Carrier, Sampler, SiteKind, Zone},
     parallel,
@@ -16,35 +17,22 @@ use crate::{
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// The columns of a table along positions: place, displacement, strain, the stress where numbers made of it are asked for, and the model.
-pub(super) fn table_header<const D: usize>(output: &StressOutput) -> Vec<String> {
-    let mut header: Vec<String> = AXES[..D].iter().map(|a| (*a).to_owned()).collect();
-    header.extend(AXES[..D].iter().map(|a| format!("u{a}")));
-    for (i, first) in AXES[..D].iter().enumerate() {
-        header.extend(AXES[i..D].iter().map(|second| format!("e{first}{second}")));
-    }
-    if !output.numbers.is_empty() {
-        header.extend(names::<D>(output));
-    }
-    header.push("model".to_owned());
-    header
+/// The columns of a table along positions: place, displacement, strain, the stress where numbers made of it are asked for, further fields that are asked for, and the model.
+pub(super) fn table_header<const D: usize>(choice: &FieldChoice) -> Vec<String> {
+    let place = AXES[..D].iter().map(|a| (*a).to_owned());
+    place.chain(columns::header::<D>(choice, true)).collect()
 }
 
+/// A position within the body.
 struct Sample<const D: usize> {
     displacement: Vector<D>,
-    /// None of a point, whose family another process may have.
-    gradient: Option<Tensor<D>>,
     carrier: Carrier,
-    zone: Zone,
-    /// The stress, if numbers made of it are asked for.
-    stress: Option<Stress<D>>,
 }
 
 /// The solution at sites and between them.
 pub(super) struct SampledSolution<'a, const D: usize> {
     solved: &'a Solved<'a, D>,
-    intact: Intact,
-    expansions: Expansions,
+    shared: Shared,
     sampler: Sampler<'a, D>,
     body: Locator<D>,
     tolerance: f64,
@@ -58,11 +46,7 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
         let (lo, hi) = model.mesh.bounds();
         Self {
             solved,
-            intact: Intact::of(solved),
-            expansions: match solved.has_derived() {
-                true => Expansions::of(solved),
-                false => Expansions::default(),
-            },
+            shared: Shared::of(solved),
             sampler: Sampler::new(model),
             body: Locator::new(&model.mesh, 0..model.mesh.cell_count()),
             tolerance: 1e-9 * (hi - lo).norm(),
@@ -86,21 +70,9 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
             return None;
         }
         let displacement = self.sampler.displacement(x, self.solved.displacement)?;
-        let solved = self.solved;
-        let carrier = self.sampler.carrier(x)?;
-        let stress = solved
-            .has_derived()
-            .then(|| solved.carried_stress(carrier, &self.expansions, &self.intact));
-        let (gradient, zone) = match carrier {
-            Carrier::Element(c, xi) => (Some(solved.gradient_in(c, &xi)), solved.model.zones[c]),
-            Carrier::Point(site) => (None, solved.zone_of_site[site]),
-        };
         Some(Sample {
             displacement,
-            gradient,
-            carrier,
-            zone,
-            stress,
+            carrier: self.sampler.carrier(x)?,
         })
     }
 
@@ -116,7 +88,7 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
         });
         let points: Vec<u32> = points.collect();
         let of_families = |own: &[u32]| {
-            let gradient = |k: usize| solved.point_gradient(own[k] as usize, &self.intact);
+            let gradient = |k: usize| solved.point_gradient(own[k] as usize, &self.shared.intact);
             let gradients = parallel::map(own.len(), 1, gradient);
             gradients.iter().flat_map(|g| g.iter().copied()).collect()
         };
@@ -130,28 +102,29 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
         let samples: Vec<Option<Sample<D>>> = parallel::map_slice(positions, |x| self.at(x));
         let of_points = self.gradients_of_points(samples.iter().flatten());
         let mut of_points = of_points.into_iter();
-        let told = positions.iter().zip(samples).filter_map(|(x, sample)| {
-            // a line may cross a slit: there is nothing to tell in it
-            let sample = sample?;
-            let gradient = sample.gradient.or_else(|| of_points.next())?;
-            let e = strain(&gradient);
-            let mut row: Vec<f64> = x
-                .iter()
-                .chain(sample.displacement.iter())
-                .copied()
-                .collect();
-            for i in 0..D {
-                row.extend((i..D).map(|j| e[(i, j)]));
-            }
-            if let Some(stress) = &sample.stress {
-                let output = self.solved.stress_output();
-                row.extend(stress.components(output));
-                row.extend(stress.derived(output));
-            }
-            row.push(f64::from(label(sample.zone)));
-            Some(row)
-        });
-        told.collect()
+        let fields = Rows::new(self.solved, true);
+        let mut told = Vec::new();
+        // a line may cross a slit: there is nothing to tell in it
+        for (x, sample) in positions.iter().zip(&samples) {
+            let Some(Sample {
+                displacement,
+                carrier,
+            }) = sample
+            else {
+                continue;
+            };
+            let gradient = match carrier {
+                Carrier::Point(_) => of_points.next(),
+                Carrier::Element(..) => None,
+            };
+            let here = (*carrier, *displacement);
+            told.push((x, here, gradient));
+        }
+        parallel::map_slice(&told, |(x, here, gradient)| {
+            let place = Place::of_position(self.solved, &self.shared, *here, *gradient);
+            let numbers = fields.at(Some(&place));
+            x.iter().copied().chain(numbers).collect()
+        })
     }
 }
 
@@ -193,10 +166,6 @@ impl<const D: usize> Solved<'_, D> {
         transfer.displacement(n, self.displacement)
     }
 
-    pub(super) fn site(&self, site: usize) -> Vector<D> {
-        Vector::from_column_slice(&self.displacement[site * D..][..D])
-    }
-
     pub(super) fn element_gradient(&self, c: usize) -> Tensor<D> {
         fem::displacement_gradient_at_centre(&self.model.mesh, c, |n| self.node(n))
     }
@@ -204,31 +173,6 @@ impl<const D: usize> Solved<'_, D> {
     /// The displacement gradient at reference coordinates `xi` of an element.
     pub(super) fn gradient_in(&self, c: usize, xi: &[f64; 3]) -> Tensor<D> {
         fem::superconvergent_gradient(&self.model.mesh, c, xi, |n| self.node(n))
-    }
-
-    /// What is written of stresses.
-    pub(super) fn stress_output(&self) -> &StressOutput {
-        &self.stresses.0.output
-    }
-
-    /// Whether numbers made of the stress are asked for.
-    pub(super) fn has_derived(&self) -> bool {
-        !self.stress_output().numbers.is_empty()
-    }
-
-    /// Stress of what carries a position.
-    pub(super) fn carried_stress(
-        &self,
-        carrier: Carrier,
-        expansions: &Expansions,
-        intact: &Intact,
-    ) -> Stress<D> {
-        match carrier {
-            Carrier::Element(c, xi) => self.stress_in(c, &xi, expansions),
-            Carrier::Point(site) => {
-                self.point_stress(site, |p, j| intact.is_intact(p, j), expansions)
-            }
-        }
     }
 
     /// Least-squares gradient over the nearest bonds of a point that stand, weighted by 1/|ξ|²: sharper than over the whole family. Zero where they do not span the space.

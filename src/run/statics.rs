@@ -158,6 +158,8 @@ fn solve_chosen<const D: usize>(
         model,
         operator: operator.as_ref(),
         displacement: &equilibrium.solution.displacement,
+        velocity: None,
+        damage: None,
         residual: &residual,
         zone_of_site: &zone_of_site(model),
         system: system.as_ref().map(|s| s as &dyn SemiDiscrete),

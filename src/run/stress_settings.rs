@@ -7,13 +7,13 @@ use crate::material::{Kinematics, LocalLaw};
 use crate::peridynamics::bond_force::BondKinematics;
 use crate::scene::materials::{Material, Ratio};
 use crate::scene::spec::BondsSpec;
-use crate::scene::validated::{Scene, StressOutput};
+use crate::scene::validated::{FieldChoice, Scene};
 
 /// What of a scene's stresses is thermal, and what is made of them.
 #[derive(Clone, Debug)]
 pub struct StressSettings<const D: usize> {
-    /// What is written.
-    pub output: StressOutput,
+    /// The fields that are asked for.
+    pub output: FieldChoice,
     /// What expands, if anything does.
     pub thermal: Option<Thermal<D>>,
     /// How the body stands for a solid.
@@ -49,7 +49,7 @@ impl<const D: usize> StressSettings<D> {
             reach: 0.25 * size,
         });
         Self {
-            output: scene.output.stresses.clone(),
+            output: scene.output.fields.clone(),
             thermal,
             kinematics,
             bonds: match scene.breaking.bonds {
@@ -67,6 +67,6 @@ impl<const D: usize> StressSettings<D> {
 
     /// Whether stresses of points are more than the bonds that a process has of its own: numbers are made of them, or a temperature has a part in them.
     pub fn asks_for_more(&self) -> bool {
-        self.thermal.is_some() || !self.output.numbers.is_empty()
+        self.thermal.is_some() || self.output.has_numbers()
     }
 }

@@ -1,35 +1,16 @@
 //! Stress of elements and points as outputs show it: less its thermal part, and the numbers made of it.
 
+use super::fields::place::Place;
 use super::solution::Solved;
 use super::thermal::Thermal;
 use crate::fem;
 use crate::peridynamics::{ForceState, bond_force::BondKinematics};
-use crate::scene::spec::StressSpec;
-use crate::scene::validated::StressOutput;
+use crate::scene::validated::FieldChoice;
 use crate::system::PlaceStress;
 use crate::tensor::{Tensor, Vector};
 
-/// The names of the columns of a stress: its components, then the numbers that are asked for.
-pub(super) fn names<const D: usize>(output: &StressOutput) -> Vec<String> {
-    let mut names = Vec::new();
-    for (i, first) in AXES[..D].iter().enumerate() {
-        names.extend(AXES[i..D].iter().map(|second| format!("s{first}{second}")));
-    }
-    names.extend(output.across.then(|| "szz".to_owned()));
-    names.extend((output.numbers.iter()).map(|s| name(s).replace('-', "_")));
-    names
-}
-
-const AXES: [&str; 3] = ["x", "y", "z"];
-
-/// The name of a number made of a stress.
-pub(super) fn name(asked: &StressSpec) -> &'static str {
-    match asked {
-        StressSpec::VonMises => "von-mises",
-        StressSpec::MaxPrincipal => "max-principal",
-        StressSpec::MinPrincipal => "min-principal",
-    }
-}
+/// Name of the field of stresses; see [`Solved::stress_name`].
+pub(super) const FIELD: &str = "stress";
 
 /// The displacements of all sites by which a body expands freely, of a scene with a temperature: by a unit rise, and by a unit gradient of it along each axis.
 #[derive(Default)]
@@ -68,14 +49,6 @@ impl<const D: usize> Stress<D> {
         }
     }
 
-    /// The components in the order of [`names`].
-    pub fn components(&self, output: &StressOutput) -> impl Iterator<Item = f64> + use<D> {
-        let upper = (0..D).flat_map(|i| (i..D).map(move |j| (i, j)));
-        let across = output.across.then_some(self.across);
-        let tensor = self.tensor;
-        upper.map(move |(i, j)| tensor[(i, j)]).chain(across)
-    }
-
     /// Three rows of three.
     pub fn rows(&self) -> [[f64; 3]; 3] {
         let mut rows = PlaceStress::new(&self.tensor, None).rows;
@@ -85,15 +58,9 @@ impl<const D: usize> Stress<D> {
         rows
     }
 
-    /// The numbers made of it that are asked for, in the order of their names.
-    pub fn derived(&self, output: &StressOutput) -> Vec<f64> {
-        let principal = principal(&self.tensor, self.across);
-        let of = |s: &StressSpec| match s {
-            StressSpec::VonMises => von_mises(&principal),
-            StressSpec::MaxPrincipal => principal.into_iter().fold(f64::NEG_INFINITY, f64::max),
-            StressSpec::MinPrincipal => principal.into_iter().fold(f64::INFINITY, f64::min),
-        };
-        output.numbers.iter().map(of).collect()
+    /// Principal stresses, that out of the plane among them, in any order.
+    pub fn principal(&self) -> [f64; 3] {
+        principal(&self.tensor, self.across)
     }
 }
 
@@ -188,7 +155,7 @@ impl<const D: usize> Solved<'_, D> {
                 };
                 self.thermal().map_or(0.0, at)
             };
-            let told = body.exact_stress(p, law, u, |j| stands(p, j), free);
+            let (told, _) = body.exact_response(p, law, u, |j| stands(p, j), free);
             return self.complete(told.tensor, told.across, material, &x);
         }
         let of = |u: &[f64]| body.partial_stress_of(p, u, |j| stands(p, j));
@@ -200,10 +167,54 @@ impl<const D: usize> Solved<'_, D> {
         self.complete(tensor, None, material, &x)
     }
 
+    /// The fields that the scene asks for.
+    pub(super) fn choice(&self) -> &FieldChoice {
+        &self.stresses.0.output
+    }
+
+    /// Stored energy of points per volume \[J/m^D\]; zero elsewhere.
+    pub(super) fn energies_of_points(&self) -> impl Fn(&Place<'_, D>) -> f64 + Sync + '_ {
+        let u = self.displacement;
+        let told = self.system.and_then(|system| system.energy_densities(u));
+        move |place| {
+            let (Some((body, p)), Some(site)) = (place.point(), place.site()) else {
+                return 0.0;
+            };
+            let stands = |j: usize| place.shared.intact.is_intact(p, j);
+            match (&told, self.exact_law()) {
+                (Some(told), _) => told[site],
+                (None, Some(law)) => body.exact_response(p, law, u, stands, |_| 0.0).1,
+                (None, None) => body.energy_density(p, u, stands),
+            }
+        }
+    }
+
+    /// Stored energy of an element per volume \[J/m^D\], at a place in it: that of its law, `½ σ : ε` without thermal strains where that is linear.
+    pub(super) fn energy_of_cell(&self, c: usize, place: &Place<'_, D>) -> f64 {
+        let told = (self.system).and_then(|system| system.energy_of_cell(c, self.displacement));
+        let linear = || {
+            let stress = place.stress();
+            let (free, across) = match self.thermal() {
+                Some((thermal, t)) => {
+                    let x = self.model.mesh.centroid(c);
+                    let material = self.model.material_of_cell(c);
+                    let free = thermal.stretch_at(&x, material, t);
+                    (
+                        thermal.cell_gradient(self.model, c, t),
+                        free * thermal.solid[usize::from(material)],
+                    )
+                }
+                None => (Tensor::zeros(), 0.0),
+            };
+            0.5 * (stress.tensor.dot(&(place.gradient() - free)) - stress.across * across)
+        };
+        told.unwrap_or_else(linear)
+    }
+
     /// The name of the field of stresses: linear ones, which a rotation turns to first order only, are called so where there are no others.
     pub(super) fn stress_name(&self) -> &'static str {
         match self.has_cauchy_stresses() {
-            true => "stress",
+            true => FIELD,
             false => "linear_stress",
         }
     }

@@ -6,13 +6,15 @@ use std::path::{Path, PathBuf};
 use rustc_hash::FxHashMap;
 
 use super::RunOptions;
+use super::fields::On;
+use super::fields::columns::arrays;
+use super::fields::place::{Shared, Spot};
 use super::loads::site_of_node;
 use super::pieces::Piece;
 use super::point_cells::PointCells;
 use super::sections;
 use super::solution::Solved;
-use super::solution_samples::{Intact, SampledSolution, label, table_header};
-use super::stresses::{self, Expansions, Stress};
+use super::solution_samples::{SampledSolution, table_header};
 use crate::fem;
 use crate::mesh::CellShape;
 use crate::observe::ObserveError;
@@ -24,8 +26,7 @@ use crate::scene::output::{PROBES, SECTIONS};
 use crate::scene::spec::PointOutputSpec;
 use crate::scene::validated::Output;
 use crate::system::Ranks;
-use crate::tensor::{Tensor, Vector, padded, strain};
-use crate::{coupling::Zone, parallel};
+use crate::tensor::{Vector, padded};
 
 /// Writes what the scene asks for; returns the files.
 ///
@@ -48,13 +49,7 @@ pub(super) fn write_for<const D: usize>(
     let solution = LazyCell::new(|| SampledSolution::new(solved, options.ranks));
     let path = |end: &str| output.directory.join(format!("{}{end}", output.name));
     let whole = path(".vtu");
-    let of = |shown: Shown<'_>| {
-        let energies = energy_densities(output, solved, shown);
-        let more = energies
-            .as_deref()
-            .map(|e| OverSites::Scalar(ENERGY_DENSITY, e));
-        snapshot(solved, more.as_slice(), output.points, shown)
-    };
+    let of = |shown: Shown<'_>| snapshot(solved, &[], output.points, shown);
     let mut written = None;
     if let Some(ranks) = options.writers().filter(|_| output.vtu) {
         let piece = Piece::new(solved.model, output.points, ranks);
@@ -83,7 +78,7 @@ pub(super) fn write_for<const D: usize>(
         tables.push((PROBES, positions));
     }
     let sampled = tables.into_iter().map(|(name, positions)| {
-        let header = table_header::<D>(solved.stress_output());
+        let header = table_header::<D>(solved.choice());
         (name, header, solution.rows(&positions))
     });
     // by all processes before one writes, which may fail
@@ -166,52 +161,24 @@ const POINT_IDENTIFIER: &str = "GlobalPointIds";
 /// The field of the number of each cell.
 const CELL_IDENTIFIER: &str = "GlobalCellIds";
 
-/// A field over sites, beside those that every solution has.
-#[derive(Clone, Copy, Debug)]
-pub enum OverSites<'a> {
-    /// A vector, like the displacement.
-    Vector(&'static str, &'a [f64]),
-    /// A number, zero at nodes that are no sites.
-    Scalar(&'static str, &'a [f64]),
-}
-
-/// The name of the field of [`energy_densities`].
-pub(super) const ENERGY_DENSITY: &str = "energy-density";
-
-/// The energy density of each site that is shown, zero at nodes, if the scene asks for it.
-pub(super) fn energy_densities<const D: usize>(
-    output: &Output<D>,
-    solved: &Solved<'_, D>,
-    shown: Shown<'_>,
-) -> Option<Vec<f64>> {
-    let u = solved.displacement;
-    let of_site = |intact: &Intact, site: usize| match solved.model.point_of(site) {
-        Some((body, p)) if shown.includes_site(site) => {
-            body.energy_density(p, u, |j| intact.is_intact(p, j))
-        }
-        _ => 0.0,
-    };
-    output.energy_density.then(|| {
-        let told = solved.system.and_then(|system| system.energy_densities(u));
-        told.unwrap_or_else(|| {
-            let intact = Intact::of(solved);
-            parallel::map(solved.model.sites.len(), 1, |site| of_site(&intact, site))
-        })
-    })
-}
+/// What laws remember of sites: a name, and a number for each, zero at nodes that are no sites.
+pub type Remembered<'a> = (&'static str, &'a [f64]);
 
 /// Cells and points with the fields of a solution; without a residual, that field is left out.
 pub fn snapshot<const D: usize>(
     solved: &Solved<'_, D>,
-    more: &[OverSites<'_>],
+    remembered: &[Remembered<'_>],
     points: PointOutputSpec,
     shown: Shown<'_>,
 ) -> Snapshot {
     let mut rows = SnapshotRows::new(solved);
     rows.push_elements(shown);
     rows.push_points(points, shown);
-    rows.snapshot.point_fields = rows.point_fields(more);
-    rows.snapshot.cell_fields = rows.cell_fields();
+    let shared = Shared::of(solved);
+    rows.snapshot.point_fields = arrays(solved, &shared, On::Points, &rows.points);
+    rows.push_remembered_by_sites(remembered);
+    rows.snapshot.cell_fields = arrays(solved, &shared, On::Cells, &rows.cells);
+    rows.push_remembered_by_cells();
     if let Shown::Piece(_) = shown {
         let [points, cells] = rows.identifiers;
         let of_points = Field::identifiers(POINT_IDENTIFIER, points);
@@ -222,26 +189,14 @@ pub fn snapshot<const D: usize>(
     rows.snapshot
 }
 
-/// Points and cells of a file with their fields as they are collected: nodes that elements use and elements, then peridynamic points, or the corners of their cells, and those cells.
+/// Points and cells of a file as they are collected: nodes that elements use and elements, then peridynamic points, or the corners of their cells, and those cells.
 struct SnapshotRows<'a, const D: usize> {
     solved: &'a Solved<'a, D>,
     snapshot: Snapshot,
-    /// The site of each point of the file, and its node.
-    site_of_point: Vec<Option<usize>>,
-    node_of_point: Vec<Option<usize>>,
-    displacement: Vec<Vector<D>>,
-    /// The spacing at each point of the file, zero at nodes of elements.
-    sizes: Vec<f64>,
-    zones: Vec<u8>,
-    volumes: Vec<f64>,
-    /// The material of each cell, where there are several.
-    materials: Vec<i32>,
-    strains: Vec<Tensor<D>>,
-    stresses: Vec<Stress<D>>,
-    /// The measure of each.
-    measures: Vec<u8>,
-    shown_cells: Vec<u32>,
-    expansions: Expansions,
+    /// What each point of the file is.
+    points: Vec<Spot>,
+    /// What each cell is.
+    cells: Vec<Spot>,
     /// Numbers of points and of cells among those of all processes; empty where one shows all.
     identifiers: [Vec<i64>; 2],
 }
@@ -251,26 +206,15 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
         Self {
             solved,
             snapshot: Snapshot::default(),
-            site_of_point: Vec::new(),
-            node_of_point: Vec::new(),
-            displacement: Vec::new(),
-            sizes: Vec::new(),
-            zones: Vec::new(),
-            volumes: Vec::new(),
-            materials: Vec::new(),
-            strains: Vec::new(),
-            stresses: Vec::new(),
-            measures: Vec::new(),
-            shown_cells: Vec::new(),
-            expansions: Expansions::of(solved),
+            points: Vec::new(),
+            cells: Vec::new(),
             identifiers: [const { Vec::new() }; 2],
         }
     }
 
-    /// Elements with strain and stress at their centres, and their nodes.
+    /// Elements and their nodes.
     fn push_elements(&mut self, shown: Shown<'_>) {
-        let solved = self.solved;
-        let (model, mesh) = (solved.model, &solved.model.mesh);
+        let (model, mesh) = (self.solved.model, &self.solved.model.mesh);
         let mut point_of_node = vec![u32::MAX; mesh.nodes.len()];
         let site_of_node = site_of_node(model);
         for c in 0..mesh.cell_count() {
@@ -279,58 +223,34 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
             }
             let mut nodes = [0u32; fem::MAX_NODES];
             for (slot, &n) in nodes.iter_mut().zip(mesh.cell(c)) {
-                let entry = &mut point_of_node[n as usize];
+                let node = n as usize;
+                let entry = &mut point_of_node[node];
                 if *entry == u32::MAX {
                     *entry = self.snapshot.points.len() as u32;
-                    self.snapshot.points.push(padded(&mesh.nodes[n as usize]));
-                    self.displacement.push(solved.node(n as usize));
-                    self.sizes.push(0.0);
-                    let site = site_of_node[n as usize];
-                    self.site_of_point.push(site.map(|site| site as usize));
-                    self.node_of_point.push(Some(n as usize));
+                    self.snapshot.points.push(padded(&mesh.nodes[node]));
+                    let site = site_of_node[node].map(|site| site as usize);
+                    self.points.push(Spot::Node { node, site });
                     if let Shown::Piece(piece) = shown {
-                        self.identifiers[0].push(piece.node(n as usize).into());
+                        self.identifiers[0].push(piece.node(node).into());
                     }
                 }
                 *slot = *entry;
             }
             self.snapshot
                 .push_cell(mesh.shapes[c], &nodes[..mesh.cell(c).len()]);
-            self.zones.push(label(model.zones[c]));
-            self.volumes.push(fem::cell_volume(mesh, c));
-            if model.several().is_some() {
-                self.materials.push(i32::from(model.material_of_cell(c)));
-            }
-            let gradient = solved.element_gradient(c);
-            self.strains.push(strain(&gradient));
-            let stress = solved.cell_stress(c, &gradient, &self.expansions);
-            self.stresses.push(stress);
-            self.measures.push(solved.measure_of_cell(c));
-            self.shown_cells.push(c as u32);
+            self.cells.push(Spot::Element(c));
             if let Shown::Piece(piece) = shown {
                 self.identifiers[1].extend(piece.cell(c).map(i64::from));
             }
         }
     }
 
-    /// Peridynamic points with strain and stress of their families.
+    /// Peridynamic points.
     fn push_points(&mut self, form: PointOutputSpec, shown: Shown<'_>) {
-        let solved = self.solved;
-        let model = solved.model;
+        let model = self.solved.model;
         let cells = PointCells::of(model);
-        let intact = Intact::of(solved);
-        let expansions = &self.expansions;
-        let on_points: Vec<(usize, Tensor<D>, Stress<D>)> =
-            parallel::filter_map(model.sites.len(), 1, |site| {
-                let (_, p) = model.point_of(site)?;
-                if !shown.includes_site(site) {
-                    return None;
-                }
-                let stress = solved.point_stress(site, |p, j| intact.is_intact(p, j), expansions);
-                Some((site, strain(&solved.point_gradient(p, &intact)), stress))
-            });
-        for (site, e, stress) in on_points {
-            let Some((body, p)) = model.point_of(site) else {
+        for site in 0..model.sites.len() {
+            let Some((_, p)) = model.point_of(site).filter(|_| shown.includes_site(site)) else {
                 continue;
             };
             let x = &model.sites[site].position;
@@ -349,114 +269,37 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
                 points.extend((corner..corner + count).map(i64::from));
                 cells.push(cell.into());
             }
-            for corner in corners {
-                self.snapshot.points.push(corner);
-                self.displacement.push(solved.site(site));
-                self.sizes.push(cells.size(p));
-                self.site_of_point.push(Some(site));
-                self.node_of_point.push(None);
-            }
-            self.zones.push(label(solved.zone_of_site[site]));
-            self.volumes.push(body.cloud.volume[p]);
-            let material = body.cloud.material.get(p);
-            self.materials.extend(material.map(|&m| i32::from(m)));
-            self.strains.push(e);
-            self.stresses.push(stress);
-            self.measures.push(solved.measure_of_point(p));
+            let spots = corners.iter().map(|_| Spot::Point(site));
+            self.points.extend(spots);
+            self.snapshot.points.extend(corners);
+            self.cells.push(Spot::Point(site));
         }
     }
 
-    /// Displacement, blending, horizon, spacing and residual, and `more` fields over sites.
-    fn point_fields(&self, more: &[OverSites<'_>]) -> Vec<Field> {
-        let solved = self.solved;
-        let model = solved.model;
-        let of_site = |f: &dyn Fn(usize) -> f64| -> Vec<f64> {
-            self.site_of_point
-                .iter()
-                .map(|s| s.map_or(0.0, f))
-                .collect()
-        };
-        // a local site has none
-        let horizon = |site: usize| match (&model.peridynamics, solved.zone_of_site[site]) {
-            (None, _) | (_, Zone::Local) => 0.0,
-            (Some(p), _) => p.horizon.at(&model.sites[site].position),
-        };
-        let on_site =
-            |s: usize, values: &[f64]| Vector::<D>::from_column_slice(&values[s * D..][..D]);
-        let mut fields = vec![
-            Field::vector("displacement", &self.displacement),
-            Field::scalar("beta", of_site(&|s| solved.operator.beta(s))),
-            Field::scalar("horizon", of_site(&horizon)),
-            Field::scalar("size", self.sizes.clone()),
-        ];
-        if !solved.residual.is_empty() {
-            let residual: Vec<Vector<D>> = self
-                .site_of_point
-                .iter()
-                .map(|s| s.map_or(Vector::zeros(), |s| on_site(s, solved.residual)))
-                .collect();
-            fields.push(Field::vector("residual", &residual));
+    /// What laws remember of points.
+    fn push_remembered_by_sites(&mut self, remembered: &[Remembered<'_>]) {
+        for (name, values) in remembered {
+            let of = |spot: &Spot| match *spot {
+                Spot::Node { site, .. } => site.map_or(0.0, |site| values[site]),
+                Spot::Point(site) => values[site],
+                Spot::Element(_) | Spot::InElement(..) => 0.0,
+            };
+            let field = Field::scalar(name, self.points.iter().map(of).collect());
+            self.snapshot.point_fields.push(field);
         }
-        for field in more {
-            fields.push(match field {
-                OverSites::Scalar(name, values) => Field::scalar(name, of_site(&|s| values[s])),
-                OverSites::Vector(name, values) => {
-                    let at = |(site, node): (&Option<usize>, &Option<usize>)| match (site, node) {
-                        (_, Some(n)) => model.node_transfer.displacement(*n, values),
-                        (Some(s), None) => on_site(*s, values),
-                        (None, None) => Vector::zeros(),
-                    };
-                    let places = self.site_of_point.iter().zip(&self.node_of_point);
-                    let vectors: Vec<Vector<D>> = places.map(at).collect();
-                    Field::vector(name, &vectors)
-                }
-            });
-        }
-        fields
     }
 
-    /// Model, volume, strain and stress, and what local laws remember.
-    fn cell_fields(&self) -> Vec<Field> {
-        let shown = self.zones.len();
-        let mut fields = vec![
-            Field::labels("model", self.zones.clone()),
-            Field::scalar("volume", self.volumes.clone()),
-            Field::tensor("strain", &self.strains),
-            Field::rows(
-                self.solved.stress_name(),
-                self.stresses.iter().map(Stress::rows),
-            ),
-        ];
-        if self.solved.has_cauchy_stresses() {
-            fields.push(Field::labels("stress_measure", self.measures.clone()));
-        }
-        let output = self.solved.stress_output();
-        let derived: Vec<Vec<f64>> = match self.solved.has_derived() {
-            true => parallel::map(shown, 1, |k| self.stresses[k].derived(output)),
-            false => Vec::new(),
-        };
-        for (k, number) in output.numbers.iter().enumerate() {
-            let values = derived.iter().map(|d| d[k]).collect();
-            fields.push(Field::scalar(stresses::name(number), values));
-        }
-        let model = self.solved.model;
-        let by_points = model.body().is_some_and(|b| !b.cloud.material.is_empty());
-        // also in a piece that shows nothing, whose fields stand for those of others
-        if model.several().is_some() || by_points {
-            fields.push(Field::integers("material", self.materials.clone()));
-        }
-        let remembered = self
-            .solved
-            .system
-            .map(|system| system.remembered_by_cells());
-        for (name, values) in remembered.into_iter().flatten() {
+    /// What local laws remember of elements.
+    fn push_remembered_by_cells(&mut self) {
+        let system = self.solved.system.into_iter();
+        for (name, values) in system.flat_map(|system| system.remembered_by_cells()) {
             let values: FxHashMap<u32, f64> = values.into_iter().collect();
-            let mut field = vec![0.0; shown];
-            for (value, c) in field.iter_mut().zip(&self.shown_cells) {
-                *value = values.get(c).copied().unwrap_or(0.0);
-            }
-            fields.push(Field::scalar(name, field));
+            let of = |spot: &Spot| match *spot {
+                Spot::Element(c) => values.get(&(c as u32)).copied().unwrap_or(0.0),
+                Spot::Node { .. } | Spot::InElement(..) | Spot::Point(_) => 0.0,
+            };
+            let field = Field::scalar(name, self.cells.iter().map(of).collect());
+            self.snapshot.cell_fields.push(field);
         }
-        fields
     }
 }

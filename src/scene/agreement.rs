@@ -4,9 +4,7 @@ use super::error::{SceneError, SceneErrorKind};
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
 use super::solve::Solve;
-use super::spec::{
-    BondsSpec, CouplingSpec, ElementsSpec, SceneSpec, SolveSpec, WeightsSpec, ZonesNeeded,
-};
+use super::spec::{CouplingSpec, ElementsSpec, SceneSpec, SolveSpec, ZonesNeeded};
 use crate::coupling::Zone;
 use crate::fem::{CellBandError, banded_law, crack_band};
 use crate::mesh::Mesh;
@@ -179,35 +177,6 @@ pub(crate) fn crack_bands<const D: usize>(
         .help(help));
     }
     Ok(())
-}
-
-/// Refuses the energy density of points whose bonds are exact and have a fast pass: that adds energies up without those of single points.
-pub(crate) fn energy_density<const D: usize>(
-    spec: &SceneSpec,
-    material: &Material<D>,
-    bonds: BondsSpec,
-) -> Result<(), SceneError> {
-    let fitted = spec
-        .peridynamics
-        .as_ref()
-        .is_none_or(|p| p.weights == WeightsSpec::Fitted);
-    if spec.output.energy_density != Some(true)
-        || bonds == BondsSpec::Linear
-        || fitted
-        || material.law.accelerator().is_none()
-    {
-        return Ok(());
-    }
-    let name = spec.materials.get_key_value(material.name.as_str());
-    Err(SceneError::new(
-        SceneErrorKind::Conflict,
-        format!(
-            "`output.energy-density` is not offered for exact bonds of the law `{}`, whose fast pass knows the energy of the whole body only",
-            material.law.name()
-        ),
-    )
-    .label(name.map_or(0..0, |(k, _)| k.span.clone()), "of this material")
-    .help("use peridynamics.bonds = \"linear\", or the law pals"))
 }
 
 /// The materials that are used and remember, by their points or by their elements.

@@ -209,7 +209,7 @@ impl<'a, const D: usize> Draft<'a, D> {
         agreement::memory(spec, materials, cells, zones)
     }
 
-    /// What elements follow; refuses energies of points where bonds that are exact have a fast pass.
+    /// Law of the elements.
     fn elements(
         &self,
         coupling: &CouplingSpec,
@@ -217,8 +217,6 @@ impl<'a, const D: usize> Draft<'a, D> {
         law: &dyn Law<D>,
         bonds: BondsSpec,
     ) -> Result<ElementsSpec, SceneError> {
-        let first = &self.materials[usize::from(used[0])];
-        agreement::energy_density(self.spec, first, bonds)?;
         elements::elements(self.spec, coupling, (&self.materials, used), law, bonds)
     }
 

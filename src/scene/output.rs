@@ -8,7 +8,7 @@ use super::places::extent;
 use super::region::{self, Region};
 use super::section;
 use super::spec::{OutputSpec, SceneSpec, SolveSpec, TipSpec};
-use super::validated::{Output, StressOutput, Tip};
+use super::validated::{FieldChoice, Output, Tip};
 use super::value::Text;
 use crate::fem::Locator;
 use crate::material::Kinematics;
@@ -94,8 +94,7 @@ pub(crate) fn output<const D: usize>(
         name: o.name.as_ref().map_or(name.to_owned(), |n| n.value.clone()),
         vtu: o.vtu.unwrap_or(true),
         points: o.points,
-        energy_density: o.energy_density.unwrap_or(false),
-        stresses: stress_output(o, kinematics),
+        fields: field_choice(o, kinematics),
         lines,
         probes,
         sections,
@@ -103,12 +102,20 @@ pub(crate) fn output<const D: usize>(
     })
 }
 
-fn stress_output(spec: &OutputSpec, kinematics: Kinematics) -> StressOutput {
-    StressOutput {
-        numbers: spec.stresses.iter().map(|s| *s.get_ref()).collect(),
+fn field_choice(spec: &OutputSpec, kinematics: Kinematics) -> FieldChoice {
+    let stresses = (spec.stresses.iter()).map(|s| s.get_ref().name().to_owned());
+    let of_points = spec.energy_density == Some(true);
+    let energy = of_points.then(|| ENERGY_DENSITY.to_owned());
+    let fields = spec.fields.iter().map(|name| name.value.clone());
+    FieldChoice {
+        asked: stresses.chain(fields).chain(energy).collect(),
+        stresses: spec.stresses.len(),
         across: kinematics == Kinematics::PlaneStrain,
     }
 }
+
+/// The field of the key `energy-density`.
+const ENERGY_DENSITY: &str = "energy-density";
 
 impl<const D: usize> Output<D> {
     /// Keeps others from the files of a scene while it runs on some `processes`; nothing to keep where it writes none.

@@ -109,13 +109,27 @@ pub struct Solver {
     pub max_iterations: usize,
 }
 
-/// What is written of the stress at probes, along lines and in fields.
+/// The fields that a scene asks for, beside those that every solution has.
 #[derive(Clone, Debug, PartialEq)]
-pub struct StressOutput {
-    /// Numbers made of it.
-    pub numbers: Vec<super::spec::StressSpec>,
+pub struct FieldChoice {
+    /// Their names: first the numbers made of the stress.
+    pub asked: Vec<String>,
+    /// How many of them are numbers made of the stress.
+    pub stresses: usize,
     /// Whether there is a normal stress out of the plane: in plane strain.
     pub across: bool,
+}
+
+impl FieldChoice {
+    /// Whether numbers made of the stress are asked for: tables then have its components too.
+    pub fn has_numbers(&self) -> bool {
+        self.stresses > 0
+    }
+
+    /// Whether any other field is asked for.
+    pub fn has_others(&self) -> bool {
+        self.asked.len() > self.stresses
+    }
 }
 
 /// The outputs of a scene.
@@ -129,10 +143,8 @@ pub struct Output<const D: usize> {
     pub vtu: bool,
     /// How it shows peridynamic points.
     pub points: super::spec::PointOutputSpec,
-    /// Whether it holds the energy density of points.
-    pub energy_density: bool,
-    /// What is written of the stress beside its components.
-    pub stresses: StressOutput,
+    /// The fields that it asks for.
+    pub fields: FieldChoice,
     /// Lines of samples: name and positions.
     pub lines: Vec<(String, Vec<Vector<D>>)>,
     /// Probes: name and position.

@@ -236,6 +236,10 @@ where
         self.body.points_without_response(self.own(u))
     }
 
+    fn energy_of_cell(&self, cell: usize, u: &[f64]) -> Option<f64> {
+        self.body.energy_of_cell(cell, self.own(u))
+    }
+
     fn stress_of_cell(&self, cell: usize, u: &[f64]) -> Option<PlaceStress> {
         self.body.stress_of_cell(cell, self.own(u))
     }

@@ -110,6 +110,10 @@ macro_rules! fields_of {
             self.$system.points_without_response(u)
         }
 
+        fn energy_of_cell(&self, cell: usize, u: &[f64]) -> Option<f64> {
+            self.$system.energy_of_cell(cell, u)
+        }
+
         fn stress_of_cell(&self, cell: usize, u: &[f64]) -> Option<$crate::system::PlaceStress> {
             self.$system.stress_of_cell(cell, u)
         }

@@ -191,6 +191,12 @@ impl<const D: usize> LocalElements<D> {
         Some(PlaceStress::new(&stress, is_known.then_some(across)))
     }
 
+    /// The mean stored energy density of a cell, if it is among them.
+    pub fn energy(&self, model: &Model<D>, cell: usize, u: &[f64]) -> Option<f64> {
+        let nodes = |n: u32| model.node_transfer.displacement(n as usize, u);
+        self.elements.energy_density(&model.mesh, cell, nodes)
+    }
+
     /// See [`NonlinearElements::remembered`].
     pub fn remembered(&self, model: &Model<D>) -> Vec<(&'static str, Vec<(u32, f64)>)> {
         self.elements.remembered(&model.mesh)

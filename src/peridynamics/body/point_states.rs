@@ -57,15 +57,15 @@ impl<const D: usize> PdBody<D> {
         self.stress_of(j, self.differences(j, u), is_intact, shape)
     }
 
-    /// The Cauchy stress of point `j` by its exact bonds to neighbours that `stands` names, of a law without memory \[Pa\]; points expand freely by the stretch `free`.
-    pub fn exact_stress(
+    /// The Cauchy stress \[Pa\] and the stored energy density \[J/m^D\] of point `j` by its exact bonds to neighbours that `stands` names, of a law without memory; points expand freely by the stretch `free`.
+    pub fn exact_response(
         &self,
         j: usize,
         law: &dyn ForceState<D>,
         u: &[f64],
         stands: impl Fn(usize) -> bool,
         free: impl Fn(usize) -> f64,
-    ) -> CauchyStress<D> {
+    ) -> (CauchyStress<D>, f64) {
         let (pair, omega) = self.kernel(j);
         let family = self.families.of(j).iter().map(|&l| l as usize);
         let volume = |l: usize| self.cloud.volume[l];

@@ -31,7 +31,7 @@ fn families_of_all<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) 
         // lists hold the bonds of all points
         && rest.breaking.precision == PrecisionSpec::Double
         && !rest.stresses.asks_for_more()
-        && !rest.output.energy_density;
+        && !rest.output.fields.has_others();
     let coupling = problem.coupling.as_ref();
     (coupling.families_of_all(p.law.linearised())).filter(|_| asks_for_own)
 }

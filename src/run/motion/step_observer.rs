@@ -17,12 +17,12 @@ use crate::observe::ObserveError;
 use crate::observe::summary::{Ended, Timings};
 use crate::progress::Progress;
 use crate::run::error::RunError;
+use crate::run::field_probes::FieldProbes;
 use crate::run::linear_parts::{LinearParts, RunKind};
 use crate::run::pieces::Piece;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
 use crate::run::solution::{self, Solved};
-use crate::run::stress_probes::StressProbes;
 use crate::run::stress_settings::StressSettings;
 use crate::run::surface_gradient::{Asked, steep_stresses};
 use crate::scene::solve::Explicit as Spec;
@@ -71,7 +71,7 @@ pub(super) struct FieldOutput<'a, const D: usize> {
     operator: &'a dyn Operator<D>,
     zone_of_site: Vec<crate::coupling::Zone>,
     stresses: &'a StressSettings<D>,
-    probes: StressProbes,
+    probes: FieldProbes,
     /// What each of several processes shows of them.
     piece: Option<Piece>,
 }
@@ -87,7 +87,7 @@ impl<'a, const D: usize> FieldOutput<'a, D> {
         let (output, stresses) = (&rest.output, &rest.stresses);
         let writers = options.writers().filter(|_| output.vtu);
         Self {
-            probes: StressProbes::new(model, output),
+            probes: FieldProbes::new(model, output),
             model,
             operator,
             zone_of_site: solution::zone_of_site(model),
@@ -106,16 +106,24 @@ impl<'a, const D: usize> FieldOutput<'a, D> {
         moment: &Moment<'_>,
     ) -> Result<(), ObserveError> {
         let broken = moment.broken_bonds();
-        let solved = self.solved(moment, &broken);
+        let damage = recorder.damage(moment);
+        let solved = self.solved(moment, &broken, damage.as_deref());
         recorder.output(moment, &solved, self.piece.as_ref())
     }
 
     /// A moment as it is shown.
-    fn solved<'m>(&'m self, moment: &'m Moment<'_>, broken: &'m [(u32, u32)]) -> Solved<'m, D> {
+    fn solved<'m>(
+        &'m self,
+        moment: &'m Moment<'_>,
+        broken: &'m [(u32, u32)],
+        damage: Option<&'m [f64]>,
+    ) -> Solved<'m, D> {
         Solved {
             model: self.model,
             operator: self.operator,
             displacement: &moment.state.u,
+            velocity: Some(&moment.state.v),
+            damage,
             residual: &[],
             zone_of_site: &self.zone_of_site,
             system: Some(moment.system),
@@ -131,7 +139,7 @@ impl<'a, const D: usize> FieldOutput<'a, D> {
             true => Vec::new(),
             false => self
                 .probes
-                .row(&self.solved(moment, &moment.broken_bonds())),
+                .row(&self.solved(moment, &moment.broken_bonds(), None)),
         }
     }
 }

@@ -34,7 +34,7 @@ impl Tables {
         let of_tip: Vec<String> = when().chain(of_tip).collect();
         let tips = output.tips.iter().enumerate();
         let tips = tips.map(|(i, tip)| open(&format!("tip_{}", tip.name), of_tip.clone(), i));
-        let of_line: Vec<String> = when().chain(table_header::<D>(&output.stresses)).collect();
+        let of_line: Vec<String> = when().chain(table_header::<D>(&output.fields)).collect();
         let lines = output.lines.iter().zip(output.tips.len()..);
         let lines = lines.map(|((name, _), i)| open(name, of_line.clone(), i));
         Ok(Self {

@@ -23,12 +23,12 @@ use crate::observe::series::Series;
 use crate::observe::summary::{Reaction, SectionForce};
 use crate::run::condition_terms::ConditionTerms;
 use crate::run::error::RunError;
+use crate::run::field_probes;
 use crate::run::motion::seen::Seen;
 use crate::run::pieces::Piece;
 use crate::run::setup::RunSettings;
 use crate::run::solution::Solved;
-use crate::run::stress_probes;
-use crate::run::write::{ENERGY_DENSITY, OverSites, Shown, energy_densities, snapshot};
+use crate::run::write::{Remembered, Shown, snapshot};
 use crate::scene::conditions::Condition;
 use crate::scene::validated::Output;
 use crate::solve::explicit::State;
@@ -144,7 +144,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let sections = SectionRows::new(&output.sections);
         let mut header = history_header(&probes, &supports, breaks, is_linear);
         header.extend(sections.header());
-        header.extend(stress_probes::header(output));
+        header.extend(field_probes::header(output));
         header.extend(impact.iter().flat_map(ImpactRecord::header));
         let begun = files_begun(output, header, &checkpoint, &options, written);
         let begun = agreed(options.ranks, begun, &output.directory);
@@ -214,7 +214,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
 
     /// As many zeros as there are columns of stresses at probes: for trials of the output.
     pub fn unprobed(&self) -> Vec<f64> {
-        vec![0.0; stress_probes::header(self.output).len()]
+        vec![0.0; field_probes::header(self.output).len()]
     }
 
     fn dissipated(&self, system: &dyn SemiDiscrete) -> f64 {
@@ -304,6 +304,14 @@ impl<'a, const D: usize> Recorder<'a, D> {
         Ok(())
     }
 
+    /// Damage of a moment, where bonds may break or lose their stiffness.
+    pub fn damage(&self, moment: &Moment<'_>) -> Option<Vec<f64>> {
+        match self.breaks {
+            Breaks::Possibly | Breaks::Gradually => moment.system.damage(),
+            Breaks::Never | Breaks::Dissipating => None,
+        }
+    }
+
     /// Appends the state to the tables of the lines, writes a VTU file, if the scene wants any, and shows the same to the observer. Collective where each process writes
     /// a `piece` of the file.
     ///
@@ -325,28 +333,13 @@ impl<'a, const D: usize> Recorder<'a, D> {
         if !writes && pieces.is_none() && observer.is_none() {
             return Ok(());
         }
-        let shown = match pieces {
-            Some((piece, _)) if observer.is_none() => Shown::Piece(piece),
-            _ => Shown::All,
-        };
         let begun = Instant::now();
-        let mut more = vec![OverSites::Vector("velocity", &moment.state.v)];
-        let damage = match self.breaks {
-            Breaks::Possibly | Breaks::Gradually => moment.system.damage(),
-            Breaks::Never | Breaks::Dissipating => None,
-        };
-        if let Some(damage) = &damage {
-            more.push(OverSites::Scalar("damage", damage));
-        }
         let remembered = moment.system.remembered();
-        for (name, values) in &remembered {
-            more.push(OverSites::Scalar(name, values));
-        }
-        let energies = energy_densities(self.output, solved, shown);
-        if let Some(energies) = &energies {
-            more.push(OverSites::Scalar(ENERGY_DENSITY, energies));
-        }
-        let of = |shown| snapshot(solved, &more, self.output.points, shown);
+        let remembered: Vec<Remembered<'_>> = remembered
+            .iter()
+            .map(|(name, values)| (*name, values.as_slice()))
+            .collect();
+        let of = |shown| snapshot(solved, &remembered, self.output.points, shown);
         let time = moment.state.time;
         let mut written = None;
         if let Some((piece, ranks)) = pieces {

@@ -67,6 +67,9 @@ pub struct OutputSpec {
     #[serde(default)]
     #[schemars(with = "Vec<StressSpec>")]
     pub stresses: Vec<Spanned<StressSpec>>,
+    /// Further fields of the VTU, by the names that `bondline fields` lists; tables along lines and at probes and histories for probes have their columns. None if left out.
+    #[serde(default)]
+    pub fields: Vec<Text>,
     /// Straight lines along which a CSV file samples the solution, by name.
     #[serde(default)]
     pub lines: BTreeMap<Text, LineSpec>,
@@ -102,6 +105,17 @@ pub enum StressSpec {
     MaxPrincipal,
     /// The smallest principal stress.
     MinPrincipal,
+}
+
+impl StressSpec {
+    /// The name, as a scene spells it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::VonMises => "von-mises",
+            Self::MaxPrincipal => "max-principal",
+            Self::MinPrincipal => "min-principal",
+        }
+    }
 }
 
 /// A line of samples.

@@ -1,0 +1,56 @@
+//! Fields at probes with each row of a history: those that the scene asks for.
+
+use super::fields::columns::{Rows, header as columns};
+use super::fields::place::{Place, Shared};
+use super::solution::Solved;
+use crate::coupling::{Carrier, Model, Sampler};
+use crate::scene::validated::Output;
+use crate::tensor::Vector;
+
+/// What carries each probe; nothing where no field is asked for.
+pub(super) struct FieldProbes {
+    carriers: Vec<Option<Carrier>>,
+}
+
+/// The columns of a scene's probes.
+pub(super) fn header<const D: usize>(output: &Output<D>) -> Vec<String> {
+    let columns = columns::<D>(&output.fields, false);
+    let of_probe = |(name, _): &(String, Vector<D>)| -> Vec<String> {
+        columns
+            .iter()
+            .map(|column| format!("{name}_{column}"))
+            .collect()
+    };
+    output.probes.iter().flat_map(of_probe).collect()
+}
+
+impl FieldProbes {
+    /// In a model.
+    pub fn new<const D: usize>(model: &Model<D>, output: &Output<D>) -> Self {
+        if header(output).is_empty() {
+            return Self {
+                carriers: Vec::new(),
+            };
+        }
+        let sampler = Sampler::new(model);
+        let carriers = output.probes.iter().map(|(_, x)| sampler.carrier(x));
+        Self {
+            carriers: carriers.collect(),
+        }
+    }
+
+    /// Whether there is nothing to tell.
+    pub fn is_empty(&self) -> bool {
+        self.carriers.is_empty()
+    }
+
+    /// The fields at each probe; zero where nothing carries it.
+    pub fn row<const D: usize>(&self, solved: &Solved<'_, D>) -> Vec<f64> {
+        let (rows, shared) = (Rows::new(solved, false), Shared::of(solved));
+        let of_probe = |carrier: &Option<Carrier>| {
+            let place = carrier.map(|carrier| Place::new(solved, &shared, carrier.into()));
+            rows.at(place.as_ref())
+        };
+        self.carriers.iter().flat_map(of_probe).collect()
+    }
+}

@@ -1,0 +1,33 @@
+//! Horizon.
+
+use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
+use crate::coupling::Zone;
+use crate::run::solution::Solved;
+
+/// Horizon.
+pub(super) struct Horizon;
+
+impl<const D: usize> OutputField<D> for Horizon {
+    fn about(&self) -> About {
+        About {
+            name: "horizon",
+            unit: "m",
+            on: On::Points,
+            rank: Rank::Scalar,
+            wanted: Wanted::Always,
+            columns: Columns::Never,
+            text: "Horizon of nonlocal sites, 0 of others.",
+        }
+    }
+
+    fn of<'s>(&self, solved: &'s Solved<'s, D>) -> Option<Found<'s, D>> {
+        let model = solved.model;
+        let of = move |site: usize| match (&model.peridynamics, solved.zone_of_site[site]) {
+            (None, _) | (_, Zone::Local) => 0.0,
+            (Some(p), _) => p.horizon.at(&model.sites[site].position),
+        };
+        Found::new("horizon", move |place| {
+            Value::Scalar(place.site().map_or(0.0, of))
+        })
+    }
+}

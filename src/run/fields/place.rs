@@ -1,0 +1,162 @@
+//! Where fields are asked for.
+
+use std::cell::OnceCell;
+
+use crate::coupling::{Carrier, Zone};
+use crate::peridynamics::PdBody;
+use crate::run::solution::Solved;
+use crate::run::solution_samples::Intact;
+use crate::run::stresses::{Expansions, Stress};
+use crate::tensor::{Tensor, Vector};
+
+/// Bonds that stand and free expansions, once for all places of a solution.
+pub(in crate::run) struct Shared {
+    pub intact: Intact,
+    pub expansions: Expansions,
+}
+
+impl Shared {
+    /// Of a solution.
+    pub fn of<const D: usize>(solved: &Solved<'_, D>) -> Self {
+        Self {
+            intact: Intact::of(solved),
+            expansions: Expansions::of(solved),
+        }
+    }
+}
+
+/// What lies at a place.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::run) enum Spot {
+    /// A node of elements, and its site if it is one.
+    Node { node: usize, site: Option<usize> },
+    /// The whole of an element.
+    Element(usize),
+    /// Reference coordinates in an element.
+    InElement(usize, [f64; 3]),
+    /// A peridynamic point, by its site.
+    Point(usize),
+}
+
+impl From<Carrier> for Spot {
+    fn from(carrier: Carrier) -> Self {
+        match carrier {
+            Carrier::Element(c, xi) => Self::InElement(c, xi),
+            Carrier::Point(site) => Self::Point(site),
+        }
+    }
+}
+
+/// A place of a solution; gradient and stress are computed once, where a field asks for them.
+pub(in crate::run) struct Place<'a, const D: usize> {
+    pub solved: &'a Solved<'a, D>,
+    pub shared: &'a Shared,
+    pub spot: Spot,
+    displacement: Option<Vector<D>>,
+    gradient: OnceCell<Tensor<D>>,
+    stress: OnceCell<Stress<D>>,
+}
+
+impl<'a, const D: usize> Place<'a, D> {
+    /// A node, an element or a point.
+    pub fn new(solved: &'a Solved<'a, D>, shared: &'a Shared, spot: Spot) -> Self {
+        Self {
+            solved,
+            shared,
+            spot,
+            displacement: None,
+            gradient: OnceCell::new(),
+            stress: OnceCell::new(),
+        }
+    }
+
+    /// A position with the displacement there; the gradient at a point may be known already.
+    pub fn of_position(
+        solved: &'a Solved<'a, D>,
+        shared: &'a Shared,
+        (carrier, displacement): (Carrier, Vector<D>),
+        gradient: Option<Tensor<D>>,
+    ) -> Self {
+        Self {
+            displacement: Some(displacement),
+            gradient: gradient.map_or_else(OnceCell::new, OnceCell::from),
+            ..Self::new(solved, shared, carrier.into())
+        }
+    }
+
+    /// Site, of a point and of a node that is one.
+    pub fn site(&self) -> Option<usize> {
+        match self.spot {
+            Spot::Node { site, .. } => site,
+            Spot::Point(site) => Some(site),
+            Spot::Element(_) | Spot::InElement(..) => None,
+        }
+    }
+
+    /// Element.
+    pub fn cell(&self) -> Option<usize> {
+        match self.spot {
+            Spot::Element(c) | Spot::InElement(c, _) => Some(c),
+            Spot::Node { .. } | Spot::Point(_) => None,
+        }
+    }
+
+    /// Peridynamic body, and the number of the point in it.
+    pub fn point(&self) -> Option<(&'a PdBody<D>, usize)> {
+        match self.spot {
+            Spot::Point(site) => self.solved.model.point_of(site),
+            Spot::Node { .. } | Spot::Element(_) | Spot::InElement(..) => None,
+        }
+    }
+
+    /// `D` numbers of each site as a vector here, interpolated at nodes that are none; zero in elements.
+    pub fn vector(&self, values: &[f64]) -> Vector<D> {
+        match self.spot {
+            Spot::Node { node, .. } => self.solved.model.node_transfer.displacement(node, values),
+            Spot::Point(site) => Vector::from_column_slice(&values[site * D..][..D]),
+            Spot::Element(_) | Spot::InElement(..) => Vector::zeros(),
+        }
+    }
+
+    /// Displacement \[m\].
+    pub fn displacement(&self) -> Vector<D> {
+        let of_sites = || self.vector(self.solved.displacement);
+        self.displacement.unwrap_or_else(of_sites)
+    }
+
+    /// Displacement gradient: of an element at its centre or at the place, of a point that of its nearest bonds.
+    pub fn gradient(&self) -> Tensor<D> {
+        *self.gradient.get_or_init(|| match self.spot {
+            Spot::Element(c) => self.solved.element_gradient(c),
+            Spot::InElement(c, xi) => self.solved.gradient_in(c, &xi),
+            Spot::Point(_) => self.point().map_or_else(Tensor::zeros, |(_, p)| {
+                self.solved.point_gradient(p, &self.shared.intact)
+            }),
+            Spot::Node { .. } => Tensor::zeros(),
+        })
+    }
+
+    /// Stress \[Pa\], without its thermal part; zero at nodes.
+    pub fn stress(&self) -> Stress<D> {
+        let (solved, Shared { intact, expansions }) = (self.solved, self.shared);
+        *self.stress.get_or_init(|| match self.spot {
+            Spot::Element(c) => solved.cell_stress(c, &self.gradient(), expansions),
+            Spot::InElement(c, xi) => solved.stress_in(c, &xi, expansions),
+            Spot::Point(site) => {
+                solved.point_stress(site, |p, j| intact.is_intact(p, j), expansions)
+            }
+            Spot::Node { .. } => Stress::zero(),
+        })
+    }
+
+    /// Zone.
+    pub fn zone(&self) -> Zone {
+        match self.spot {
+            Spot::Element(c) | Spot::InElement(c, _) => self.solved.model.zones[c],
+            Spot::Point(site) => self.solved.zone_of_site[site],
+            Spot::Node { site, .. } => {
+                site.map_or(Zone::Local, |site| self.solved.zone_of_site[site])
+            }
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! Volume of a cell.
+
+use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
+use crate::fem;
+use crate::run::solution::Solved;
+
+/// Volume of a cell.
+pub(super) struct Volume;
+
+impl<const D: usize> OutputField<D> for Volume {
+    fn about(&self) -> About {
+        About {
+            name: "volume",
+            unit: "m³",
+            on: On::Cells,
+            rank: Rank::Scalar,
+            wanted: Wanted::Always,
+            columns: Columns::Never,
+            text: "Volume of an element or of a point.",
+        }
+    }
+
+    fn of<'s>(&self, solved: &'s Solved<'s, D>) -> Option<Found<'s, D>> {
+        let mesh = &solved.model.mesh;
+        Found::new("volume", move |place| {
+            let of_point = || place.point().map_or(0.0, |(body, p)| body.cloud.volume[p]);
+            let of_cell = |c| fem::cell_volume(mesh, c);
+            Value::Scalar(place.cell().map_or_else(of_point, of_cell))
+        })
+    }
+}
