@@ -7,8 +7,14 @@ use super::{
     stress_measures::{Stuff, YOUNG, every_law},
 };
 
-/// Laws for strains of any size: in plane strain they are stressed out of the plane, and not by a linear law.
-const LARGE_STRAINS: [&str; 2] = ["neo-hooke", "st-venant-kirchhoff"];
+/// Laws of solids that are not linear: in plane strain what they have out of the plane is that of Hooke's law in small strains alone.
+const NOT_LINEAR: [&str; 5] = [
+    "neo-hooke",
+    "st-venant-kirchhoff",
+    "plastic-correspondence",
+    "johnson-cook",
+    "damage-correspondence",
+];
 
 const FREE: f64 = 0.04;
 const HELD: f64 = 1e-6;
@@ -190,10 +196,8 @@ fn check(kinematics: Kinematics) {
             for &way in ways {
                 // what relaxes is pressed less and less
                 let relaxes = way != Way::AtRest && stuff.text.contains("relax");
-                let is_large =
-                    LARGE_STRAINS.contains(&stuff.key) || stuff.text.contains("\"large\"");
                 let free = match kinematics {
-                    Kinematics::PlaneStrain if is_large => HELD,
+                    Kinematics::PlaneStrain if NOT_LINEAR.contains(&stuff.key) => HELD,
                     _ => FREE,
                 };
                 for (stretch, held) in [(free, false), (HELD, true)] {
