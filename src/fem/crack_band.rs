@@ -46,7 +46,7 @@ pub fn banded_law<const D: usize>(
 ) -> Result<Option<Arc<dyn LocalLaw<D>>>, CellBandError> {
     // to seven digits, so that equal cells have the same
     let width = f64::from(crack_band(mesh, cell) as f32);
-    let Some(banded) = law.damage().and_then(|_| law.in_band(width)) else {
+    let Some(banded) = law.history().damage.and_then(|_| law.in_band(width)) else {
         return Ok(None);
     };
     if mesh.shapes[cell].is_quadratic() {
@@ -97,7 +97,7 @@ impl<const D: usize> CellLaws<D> {
             self.typed.push(Arc::clone(&law));
             self.typed.len() - 1
         });
-        let width = match law.damage() {
+        let width = match law.history().damage {
             Some(_) => crack_band(mesh, cell) as f32,
             None => 0.0,
         };

@@ -184,7 +184,7 @@ impl<const D: usize> NonlinearElements<D> {
         self.expanded.resize(self.forces.len(), Vector::zeros());
         for element in &self.elements {
             let law = self.laws[element.law as usize].as_ref();
-            let Some(place) = law.free_stretch() else {
+            let Some(place) = law.history().free_stretch else {
                 continue;
             };
             let cell = element.cell as usize;
@@ -304,7 +304,7 @@ impl<const D: usize> NonlinearElements<D> {
     pub fn remembered(&self, mesh: &Mesh<D>) -> Vec<(&'static str, Vec<(u32, f64)>)> {
         let mut found: Vec<(&'static str, Vec<(u32, f64)>)> = Vec::new();
         for element in &self.elements {
-            let names = self.laws[element.law as usize].history();
+            let names = self.laws[element.law as usize].history().names;
             let shown = names
                 .iter()
                 .enumerate()

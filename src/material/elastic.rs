@@ -1,6 +1,6 @@
 //! Isotropic linear elasticity.
 
-use super::{Kinematics, LocalLaw, LocalResponse, MaterialError};
+use super::{Kinematics, LocalHistory, LocalLaw, LocalResponse, MaterialError};
 use crate::tensor::{Tensor, Tensor4};
 
 /// An isotropic, linearly elastic solid, validated.
@@ -153,8 +153,8 @@ impl<const D: usize> LocalLaw<D> for LinearElastic<D> {
         false
     }
 
-    fn history(&self) -> &'static [&'static str] {
-        &[]
+    fn history(&self) -> LocalHistory {
+        LocalHistory::NONE
     }
 
     fn algorithmic_tangent(&self, _gradient: &Tensor<D>, _step: f64, _past: &[f64]) -> Tensor4<D> {

@@ -1,7 +1,7 @@
 //! The linear viscoelastic solid: a Prony series of the shear modulus, an elastic bulk.
 
 use super::prony::{PronySeries, PronyStep};
-use super::{LocalLaw, LocalResponse};
+use super::{LocalHistory, LocalLaw, LocalResponse};
 use crate::tensor::{Tensor, Tensor4, strain};
 
 /// Components of a strain that are remembered: xx, xy, xz, yy, yz, zz.
@@ -79,8 +79,8 @@ impl LocalLaw<3> for GeneralisedMaxwell {
         false
     }
 
-    fn history(&self) -> &'static [&'static str] {
-        &HISTORY[..COMPONENTS.len() * self.series.remembered()]
+    fn history(&self) -> LocalHistory {
+        LocalHistory::of(&HISTORY[..COMPONENTS.len() * self.series.remembered()])
     }
 
     fn flows_at_constant_volume(&self) -> bool {

@@ -1,6 +1,6 @@
 //! Hyperelastic solids, for displacement gradients of any size.
 
-use super::{LocalLaw, LocalResponse};
+use super::{LocalHistory, LocalLaw, LocalResponse};
 use crate::tensor::{Tensor, Tensor4, inverse};
 
 fn delta(i: usize, j: usize) -> f64 {
@@ -47,8 +47,8 @@ impl LocalLaw<3> for StVenantKirchhoff {
         false
     }
 
-    fn history(&self) -> &'static [&'static str] {
-        &[]
+    fn history(&self) -> LocalHistory {
+        LocalHistory::NONE
     }
 
     // δ_ik S_lj + λ F_ij F_kl + μ ((F Fᵀ)_ik δ_jl + F_il F_kj)
@@ -140,8 +140,8 @@ impl LocalLaw<3> for NeoHooke {
         false
     }
 
-    fn history(&self) -> &'static [&'static str] {
-        &[]
+    fn history(&self) -> LocalHistory {
+        LocalHistory::NONE
     }
 
     // μ δ_ik δ_jl + (μ − λ ln J) A_il A_kj + λ A_ij A_kl,  A = F⁻ᵀ

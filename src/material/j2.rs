@@ -1,6 +1,6 @@
 //! Von Mises plasticity with isotropic hardening, for small strains.
 
-use super::{Hardening, Kinematics, LocalLaw, LocalResponse};
+use super::{Hardening, Kinematics, LocalHistory, LocalLaw, LocalResponse};
 use crate::tensor::{Tensor, Tensor4, strain};
 
 /// J2 plasticity: `σ = C : (ε − ε_p)`, `f = √(3/2) |dev σ| − σ_y(α) ≤ 0`, `ε̇_p = α̇ √(3/2) dev σ/|dev σ|`, with the yield stress of [`Hardening`].
@@ -170,8 +170,8 @@ impl<const D: usize> LocalLaw<D> for J2<D> {
         D > 1
     }
 
-    fn history(&self) -> &'static [&'static str] {
-        match D {
+    fn history(&self) -> LocalHistory {
+        LocalHistory::of(match D {
             1 => &["plastic strain xx", "equivalent plastic strain"],
             2 => &[
                 "plastic strain xx",
@@ -188,7 +188,7 @@ impl<const D: usize> LocalLaw<D> for J2<D> {
                 "plastic strain zz",
                 "equivalent plastic strain",
             ],
-        }
+        })
     }
 
     fn algorithmic_tangent(&self, gradient: &Tensor<D>, step: f64, past: &[f64]) -> Tensor4<D> {

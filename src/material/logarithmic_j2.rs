@@ -1,6 +1,6 @@
 //! Von Mises plasticity for strains and rotations of any size, in logarithmic strains.
 
-use super::{Hardening, J2, LocalLaw, LocalResponse};
+use super::{Hardening, J2, LocalHistory, LocalLaw, LocalResponse};
 use crate::tensor::{Tensor, Tensor4, Vector, inverse, strain};
 
 /// J2 plasticity in logarithmic strains: `F = F_e F_p`, `ε_e = ½ ln b_e`, `b_e = F_e F_eᵀ = F C_p⁻¹ Fᵀ`, and [`J2`] between the elastic strain `ε_e` and the Kirchhoff stress `τ = C : ε_e`.
@@ -155,8 +155,8 @@ impl LocalLaw<3> for LogarithmicJ2 {
         true
     }
 
-    fn history(&self) -> &'static [&'static str] {
-        &[
+    fn history(&self) -> LocalHistory {
+        LocalHistory::of(&[
             "plastic deformation xx",
             "plastic deformation xy",
             "plastic deformation xz",
@@ -164,7 +164,7 @@ impl LocalLaw<3> for LogarithmicJ2 {
             "plastic deformation yz",
             "plastic deformation zz",
             "equivalent plastic strain",
-        ]
+        ])
     }
 
     // dP = dτ F⁻ᵀ − τ F⁻ᵀ dFᵀ F⁻ᵀ; dτ of the return of small strains ([Simo1992]) by the logarithm of b_e = F C_p⁻¹ Fᵀ, whose derivative divides its differences in the principal directions

@@ -200,6 +200,56 @@ impl<const D: usize> LocalResponse<D> {
     }
 }
 
+/// What a local law remembers of a point; all numbers are zero at the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LocalHistory {
+    /// The names of the numbers. Those without a name are not shown.
+    pub names: &'static [&'static str],
+    /// Which of them is the damage D, by which the law loses its stiffness; none of a law that does not.
+    pub damage: Option<usize>,
+    /// Which of them is the free stretch `α ΔT`, for the owner of a temperature to write before each response; none of a law that does not expand by itself.
+    pub free_stretch: Option<usize>,
+    /// Whether the response depends on how the deformation came about.
+    pub is_path_dependent: bool,
+}
+
+impl LocalHistory {
+    /// A law without memory.
+    pub const NONE: Self = Self::of(&[]);
+
+    /// A law that remembers its path by these numbers, none of them a damage.
+    pub const fn of(names: &'static [&'static str]) -> Self {
+        Self {
+            names,
+            damage: None,
+            free_stretch: None,
+            is_path_dependent: !names.is_empty(),
+        }
+    }
+
+    /// How many numbers.
+    pub fn len(&self) -> usize {
+        self.names.len()
+    }
+
+    /// Whether nothing is remembered.
+    pub fn is_empty(&self) -> bool {
+        self.names.is_empty()
+    }
+}
+
+/// The central differences of [`LocalLaw::respond`].
+pub fn differenced_tangent<const D: usize>(
+    law: &(impl LocalLaw<D> + ?Sized),
+    gradient: &Tensor<D>,
+    step: f64,
+    past: &[f64],
+) -> Tensor4<D> {
+    central_differences(gradient, past.len(), |gradient, present| {
+        law.respond(gradient, step, past, present).stress
+    })
+}
+
 /// A local law: stress and energies of a displacement gradient, and of what it remembers.
 pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
     /// `C_ijkl = ∂P_ij/∂G_kl` of the undeformed body \[Pa\].
@@ -211,13 +261,8 @@ pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
     /// Whether it holds for strains of any size: a rotation of the deformed body rotates its stress, `P(Q F) = Q P(F)`.
     fn is_objective(&self) -> bool;
 
-    /// The names of the numbers that it remembers; all are zero at the start. Those without a name are not shown.
-    fn history(&self) -> &'static [&'static str];
-
-    /// Whether the response depends on how the deformation came about; a temperature that it is told does not count.
-    fn is_path_dependent(&self) -> bool {
-        !self.history().is_empty()
-    }
+    /// What it remembers of a point.
+    fn history(&self) -> LocalHistory;
 
     /// Whether it flows without a change of volume, so that cells with a dilatation at each quadrature point would resist it.
     fn flows_at_constant_volume(&self) -> bool;
@@ -231,16 +276,6 @@ pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
         present: &mut [f64],
     ) -> LocalResponse<D>;
 
-    /// Which of the numbers that it remembers is its free stretch `α ΔT`, for the owner of a temperature to write before each response; none of a law that does not expand by itself.
-    fn free_stretch(&self) -> Option<usize> {
-        None
-    }
-
-    /// Which of the numbers that it remembers is the damage D, by which it loses its stiffness; none of a law that does not.
-    fn damage(&self) -> Option<usize> {
-        None
-    }
-
     /// The law where its deformation localises in a band of the width `width` \[m\]: of a law whose softening takes an energy per area, so that what it does at a point depends on that length. None of a law without one.
     fn in_band(&self, _width: f64) -> Option<Result<Arc<dyn LocalLaw<D>>, WideBand>> {
         None
@@ -249,14 +284,7 @@ pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
     /// The algorithmic tangent `C_ijkl = ∂P_ij/∂G_kl` of [`LocalLaw::respond`] \[Pa\], with which Newton's method converges quadratically; where it has a kink, at the onset of flow, that of either side.
     /// Not a number where there is no response. A law that says nothing has the central differences of its response, `2 D²` of them.
     fn algorithmic_tangent(&self, gradient: &Tensor<D>, step: f64, past: &[f64]) -> Tensor4<D> {
-        self.differenced_tangent(gradient, step, past)
-    }
-
-    /// The central differences of [`LocalLaw::respond`].
-    fn differenced_tangent(&self, gradient: &Tensor<D>, step: f64, past: &[f64]) -> Tensor4<D> {
-        central_differences(gradient, past.len(), |gradient, present| {
-            self.respond(gradient, step, past, present).stress
-        })
+        differenced_tangent(self, gradient, step, past)
     }
 
     /// Whether `C_ijkl = C_klij` holds for [`LocalLaw::algorithmic_tangent`], so that solvers may take a stiffness made of it for a symmetric one.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::{Kinematics, LocalLaw, LocalResponse, WideBand};
+use super::{Kinematics, LocalHistory, LocalLaw, LocalResponse, WideBand};
 use crate::tensor::{Tensor, Tensor4};
 
 /// Numbers that a law remembers of a point, up to which they take no memory of their own.
@@ -21,7 +21,7 @@ const ITERATIONS: usize = 60;
 pub struct Reduced<const D: usize> {
     law: Arc<dyn LocalLaw<3>>,
     /// What the law remembers, then the numbers of [`OWN`] where it remembers any and a strain is free.
-    history: &'static [&'static str],
+    history: LocalHistory,
     /// The first direction whose strain follows from the stress being zero; 3 if there is none.
     free: usize,
     tangent: Tensor4<D>,
@@ -50,10 +50,10 @@ impl<const D: usize> Reduced<D> {
             Kinematics::PlaneStrain | Kinematics::Solid => 3,
         };
         let tangent = condensed(law.tangent(), free);
-        let history = match law.history() {
-            solid if free < 3 && !solid.is_empty() => with_unnamed(solid, OWN),
-            solid => solid,
-        };
+        let mut history = law.history();
+        if free < 3 && !history.is_empty() {
+            history.names = with_unnamed(history.names, OWN);
+        }
         Self {
             law,
             history,
@@ -202,25 +202,13 @@ impl<const D: usize> LocalLaw<D> for Reduced<D> {
         self.law.is_objective()
     }
 
-    fn is_path_dependent(&self) -> bool {
-        self.law.is_path_dependent()
-    }
-
     fn flows_at_constant_volume(&self) -> bool {
         // the thickness, or the sides, make up for the rest
         self.free == 3 && self.law.flows_at_constant_volume()
     }
 
-    fn history(&self) -> &'static [&'static str] {
+    fn history(&self) -> LocalHistory {
         self.history
-    }
-
-    fn free_stretch(&self) -> Option<usize> {
-        self.law.free_stretch()
-    }
-
-    fn damage(&self) -> Option<usize> {
-        self.law.damage()
     }
 
     fn in_band(&self, width: f64) -> Option<Result<Arc<dyn LocalLaw<D>>, WideBand>> {
@@ -400,8 +388,8 @@ mod tests {
             false
         }
 
-        fn history(&self) -> &'static [&'static str] {
-            &NUMBERS
+        fn history(&self) -> LocalHistory {
+            LocalHistory::of(&NUMBERS)
         }
 
         fn respond(

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Envelope, LocalLaw, LocalResponse, WideBand};
+use super::{Envelope, LocalHistory, LocalLaw, LocalResponse, WideBand};
 use crate::tensor::{Tensor, Tensor4, strain};
 
 /// The part of the stiffness that is left of a material that is damaged through: it holds the nodes of its cells in place, and bears a millionth of what the whole material would.
@@ -148,12 +148,11 @@ impl LocalLaw<3> for ScalarDamage {
         false
     }
 
-    fn history(&self) -> &'static [&'static str] {
-        &HISTORY
-    }
-
-    fn damage(&self) -> Option<usize> {
-        Some(0)
+    fn history(&self) -> LocalHistory {
+        LocalHistory {
+            damage: Some(0),
+            ..LocalHistory::of(&HISTORY)
+        }
     }
 
     fn in_band(&self, width: f64) -> Option<Result<Arc<dyn LocalLaw<3>>, WideBand>> {

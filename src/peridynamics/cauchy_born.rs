@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use super::bond_force::{BondKinematics, stretch::psi};
 use crate::{
-    material::{LocalLaw, LocalResponse, central_differences},
+    material::{LocalHistory, LocalLaw, LocalResponse, central_differences},
     peridynamics::{Accelerator, EnergyDensity, Law, MemorylessFamily, StatePart},
     tensor::{Tensor, Tensor4, Vector, determinant},
 };
@@ -221,8 +221,8 @@ impl<const D: usize> LocalLaw<D> for CauchyBorn<D> {
         self.kinematics == BondKinematics::Exact
     }
 
-    fn history(&self) -> &'static [&'static str] {
-        &[]
+    fn history(&self) -> LocalHistory {
+        LocalHistory::NONE
     }
 
     fn flows_at_constant_volume(&self) -> bool {

@@ -79,15 +79,6 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
         self.is_linear()
     }
 
-    /// Whether its force states depend on how the deformation came about.
-    fn is_path_dependent(&self) -> bool {
-        self.force_state()
-            .is_some_and(|states| match states.correspondence(None) {
-                Some(point) => point.law.is_path_dependent(),
-                None => !states.history().is_empty(),
-            })
-    }
-
     /// Whether its bonds lose their stiffness by a damage of their own, [`crate::peridynamics::HistoryLayout::damage`].
     fn damages(&self) -> bool {
         let states = self.force_state();

@@ -143,7 +143,7 @@ pub(crate) fn of_elements<const D: usize>(
     };
     let softens = |c: usize| {
         let law = laws[model.material_of_cell(c) as usize].as_ref();
-        law.is_some_and(|law| law.damage().is_some())
+        law.is_some_and(|law| law.history().damage.is_some())
     };
     let all = [
         flowing(model, flows),

@@ -133,7 +133,11 @@ pub(crate) fn crack_bands<const D: usize>(
     (mesh, zones): (&Mesh<D>, &[Zone]),
 ) -> Result<(), SceneError> {
     for (own, material) in materials.iter().enumerate() {
-        let Some(law) = material.law.local_law().filter(|l| l.damage().is_some()) else {
+        let Some(law) = material
+            .law
+            .local_law()
+            .filter(|l| l.history().damage.is_some())
+        else {
             continue;
         };
         let cells = (0..mesh.cell_count())
@@ -185,10 +189,16 @@ fn remembering<'a, const D: usize>(
     cell_material: &[u16],
     zones: &[Zone],
 ) -> Option<&'a Material<D>> {
-    let by_points = |m: &Material<D>| m.law.is_path_dependent();
+    let by_points = |m: &Material<D>| {
+        let states = m.law.force_state();
+        states.is_some_and(|states| match states.correspondence(None) {
+            Some(point) => point.law.history().is_path_dependent,
+            None => !states.history().is_empty(),
+        })
+    };
     let by_elements = |m: &Material<D>| {
         let law = m.law.local_law();
-        law.is_some_and(|law| law.is_path_dependent())
+        law.is_some_and(|law| law.history().is_path_dependent)
     };
     let mut used = zones.iter().zip(cell_material);
     let remembers = |(zone, m): &(&Zone, &u16)| match zone {

@@ -8,7 +8,9 @@ use std::{
     },
 };
 
-use bondline::material::{LocalLaw, LocalResponse, UmatEnergies, UmatSettings};
+use bondline::material::{
+    LocalHistory, LocalLaw, LocalResponse, UmatEnergies, UmatSettings, differenced_tangent,
+};
 use bondline::tensor::{Tensor, Tensor4, determinant, inverse, strain};
 
 use crate::library::{Call, Routine};
@@ -415,8 +417,8 @@ impl LocalLaw<3> for Umat {
         self.settings.flows_at_constant_volume
     }
 
-    fn history(&self) -> &'static [&'static str] {
-        self.history
+    fn history(&self) -> LocalHistory {
+        LocalHistory::of(self.history)
     }
 
     fn failure(&self) -> Option<String> {
@@ -460,7 +462,7 @@ impl LocalLaw<3> for Umat {
 
     fn algorithmic_tangent(&self, gradient: &Tensor<3>, step: f64, past: &[f64]) -> Tensor4<3> {
         if !self.settings.has_tangent {
-            return self.differenced_tangent(gradient, step, past);
+            return differenced_tangent(self, gradient, step, past);
         }
         let mut states = past[STATES..].to_vec();
         match self.called(gradient, step, past, &mut states) {

@@ -125,7 +125,7 @@ mod tests {
     use super::*;
     use crate::fem::sample::{boxes, noise};
     use crate::material::{
-        Hardening, J2, Kinematics, LocalResponse, LogarithmicJ2, NeoHooke, Reduced,
+        Hardening, J2, Kinematics, LocalHistory, LocalResponse, LogarithmicJ2, NeoHooke, Reduced,
         StVenantKirchhoff,
     };
 
@@ -148,8 +148,8 @@ mod tests {
             true
         }
 
-        fn history(&self) -> &'static [&'static str] {
-            &[]
+        fn history(&self) -> LocalHistory {
+            LocalHistory::NONE
         }
 
         fn flows_at_constant_volume(&self) -> bool {

@@ -1,4 +1,4 @@
-//! Temperature in the generic pass. A local law that expands ([`LocalLaw::free_stretch`](crate::material::LocalLaw::free_stretch)) is given the free stretch of its point, and sums the work of heating itself. Of all others, what is left of the stretch of a bond beyond the free expansion of its ends is what its law and its criterion see, and a change of temperature does work.
+//! Temperature in the generic pass. A local law that expands ([`LocalHistory::free_stretch`](crate::material::LocalHistory::free_stretch)) is given the free stretch of its point, and sums the work of heating itself. Of all others, what is left of the stretch of a bond beyond the free expansion of its ends is what its law and its criterion see, and a change of temperature does work.
 //!
 //! A bond expands freely by the mean `s̄ = (α_i τ_i + α_j τ_j)/2` of its ends, which is exact along it where the temperature is linear. Its law has the extension `e − s̄ |ξ|`, and it breaks where `s − s̄` is beyond the critical stretch.
 //! The energy W of the bonds then changes with the temperature too, `∂W/∂s̄ = −Σ T⟨ξ⟩·M |ξ| V V′`: summed by the trapezoidal rule as loads are, this is the work of heating, without which the energy would not balance.
@@ -21,7 +21,7 @@ impl<const D: usize> Generic<D> {
     /// Which of the numbers of a point is the free stretch of its local law.
     fn stretch_place(&self) -> Option<usize> {
         let law = self.law.force_state()?.correspondence(None)?.law;
-        law.free_stretch()
+        law.history().free_stretch
     }
 
     /// Ends a force: the first of all is where the sum of the work begins.

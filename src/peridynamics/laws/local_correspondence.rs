@@ -98,11 +98,14 @@ impl<const D: usize> Law<D> for LocalCorrespondence<D> {
 
     /// Not of a law that softens: it loses its stiffness before.
     fn has_breakable_bonds(&self) -> bool {
-        self.local.damage().is_none()
+        self.local.history().damage.is_none()
     }
 
     fn calibrate(&self) -> Option<&dyn Calibrate<D>> {
-        self.local.damage().map(|_| self as &dyn Calibrate<D>)
+        self.local
+            .history()
+            .damage
+            .map(|_| self as &dyn Calibrate<D>)
     }
 
     fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {
@@ -180,10 +183,11 @@ fn displacement_gradient<const D: usize>(
 
 impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
     fn history(&self) -> HistoryLayout {
+        let history = self.local.history();
         HistoryLayout {
-            point: self.local.history(),
+            point: history.names,
             bond: &[],
-            damage: self.local.damage().map(KeptDamage::Point),
+            damage: history.damage.map(KeptDamage::Point),
         }
     }
 
@@ -211,7 +215,7 @@ impl<const D: usize> ForceState<D> for LocalCorrespondence<D> {
         let objective = law.is_objective();
         let felt = felt(&gradient, family.carried, objective);
         let local = law.respond(&felt, step, past.point, present.point);
-        let fades = |point: &[f64]| law.damage().map_or(1.0, |d| control_left(point[d]));
+        let fades = |point: &[f64]| law.history().damage.map_or(1.0, |d| control_left(point[d]));
         let (fade, faded) = (fades(past.point), fades(present.point));
         if family.damage > 0.0 && !local.stored.is_finite() {
             // what is left of the family is turned inside out
