@@ -8,12 +8,13 @@
 //! | `shared_blocks.rs`, `spmv.rs`, `exact_sum.rs`, `segments.rs` | rows that share blocks; products, exact sums, ranges of sites |
 //! | `element_tangent.rs`, `springs.rs`, `neighbour_springs.rs` | what elements and springs add to the tangent |
 //! | `ranks.rs`, `partition.rs`, `ghosts.rs`, `shared_steps.rs` | several processes, and which sites each has |
-//! | `place_stress.rs` | the stress of a place |
+//! | `place_stress.rs`, `body_state.rs` | the stress of a place; damage, stresses and memory of a body |
 //! | `term.rs`, `with_terms.rs` | force terms beside a body, and their sum |
 //! | `linear_motion.rs`, `wrapped.rs` | a system of a matrix, and one around another |
 
 use crate::parallel;
 
+mod body_state;
 mod element_tangent;
 mod exact_sum;
 mod ghosts;
@@ -31,6 +32,7 @@ mod term;
 mod with_terms;
 pub(crate) mod wrapped;
 
+pub use body_state::BodyState;
 pub use element_tangent::ElementTangent;
 pub use exact_sum::ExactSum;
 pub use ghosts::{Ghosts, Traffic};
@@ -261,6 +263,9 @@ pub trait SemiDiscrete: Send + Sync {
         (0..self.mass().len() as u32).collect()
     }
 
+    /// The state of the body, as results show it; none of a linear system in which nothing breaks.
+    fn body_state(&self) -> Option<&dyn BodyState>;
+
     /// Whether the tangent is symmetric, so that there is an energy to conserve.
     fn symmetry(&self) -> Symmetry;
 
@@ -282,61 +287,6 @@ pub trait SemiDiscrete: Send + Sync {
     /// All energy of [`SemiDiscrete::dissipation`] \[J\].
     fn dissipated_energy(&self) -> Option<f64> {
         self.dissipation().map(|d| d.total())
-    }
-
-    /// Cauchy stress of a site by its force state; none where that is linear, or has no memory and follows from the displacement alone.
-    fn stress_of_site(&self, _site: usize, _u: &[f64]) -> Option<PlaceStress> {
-        None
-    }
-
-    /// The energy density \[J/m^D\] of each site, zero but at points; none if it follows from the displacements by the linear force states.
-    fn energy_densities(&self, _u: &[f64]) -> Option<Vec<f64>> {
-        None
-    }
-
-    /// Number of points that have lost so many bonds that their law does not respond: they carry no stress of their own.
-    fn points_without_response(&self, _u: &[f64]) -> usize {
-        0
-    }
-
-    /// What the law remembers of each site, by name; zero for a site that remembers nothing.
-    fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
-        Vec::new()
-    }
-
-    /// Mean Cauchy stress of a cell whose law is not linear; none of any other.
-    fn stress_of_cell(&self, _cell: usize, _u: &[f64]) -> Option<PlaceStress> {
-        None
-    }
-
-    /// Mean stored energy per volume of a cell whose law is not linear \[J/m^D\]; none of any other.
-    fn energy_of_cell(&self, _cell: usize, _u: &[f64]) -> Option<f64> {
-        None
-    }
-
-    /// What the local laws of finite elements remember, by name and cell.
-    fn remembered_by_cells(&self) -> Vec<(&'static str, Vec<(u32, f64)>)> {
-        Vec::new()
-    }
-
-    /// Damage of each site, `1 − Σ V of intact bonds / Σ V of all`; none if nothing can break.
-    fn damage(&self) -> Option<Vec<f64>> {
-        None
-    }
-
-    /// A site at which damage has reached the edge of the region where bonds can break, if it has: what is computed from then on is not to be trusted.
-    fn damage_at_edge(&self) -> Option<usize> {
-        None
-    }
-
-    /// Sites with a broken bond, ascending in the order of their points.
-    fn damaged_sites(&self) -> Vec<u32> {
-        Vec::new()
-    }
-
-    /// Broken bonds by the sites of their ends, each once for each direction; without those that a seam cuts.
-    fn broken_bonds(&self) -> Vec<(u32, u32)> {
-        Vec::new()
     }
 
     /// What breaking changes (one bit per bond, and what cannot be recomputed from it), for a checkpoint; empty without damage.

@@ -3,6 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `behaviour.rs` | how bonds deform and break, as a run asks for it |
+//! | `body_state.rs` | damage, stresses and memory, as results show them |
 //! | `heat.rs`, `heated_forces.rs` | bonds that know their temperature |
 //! | `body.rs`, `force_states.rs`, `elements.rs` | the points and their bonds, nonlinear force states, nonlinear finite elements |
 //! | `rows.rs`, `tangent_pattern.rs` | linear rows of the sites, blocks of the elements' tangent |
@@ -16,19 +17,14 @@
 
 use std::sync::{Arc, PoisonError};
 
-use self::{
-    body::{MovingBody, reached},
-    elements::LocalElements,
-    energy::ElementEnergy,
-    rows::SiteRows,
-};
+use self::{body::MovingBody, elements::LocalElements, energy::ElementEnergy, rows::SiteRows};
 use crate::{
     coupling::{ExactStresses, Model, NonlinearSeam, Operator},
     material::LocalLaw,
     peridynamics::bond_force::{BondKinematics, BondPass, HeatedBonds},
     system::{
-        BlockCsr, Dissipation, ElementTangent, FailureUpdate, Halfway, Interval, PlaceStress,
-        Ranks, SemiDiscrete, SharedSteps, Symmetry,
+        BlockCsr, BodyState, Dissipation, ElementTangent, FailureUpdate, Halfway, Interval, Ranks,
+        SemiDiscrete, SharedSteps, Symmetry,
     },
 };
 use behaviour::NONE;
@@ -39,6 +35,7 @@ pub use rows::scale_rows;
 
 pub(crate) mod behaviour;
 mod body;
+mod body_state;
 mod dissipation;
 mod elements;
 mod energy;
@@ -485,77 +482,8 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         self.spent.area += spent.area;
     }
 
-    fn points_without_response(&self, u: &[f64]) -> usize {
-        self.count_without_response(u)
-    }
-
-    fn stress_of_site(&self, site: usize, u: &[f64]) -> Option<PlaceStress> {
-        self.stress_of_point(site, u)
-    }
-
-    fn energy_densities(&self, u: &[f64]) -> Option<Vec<f64>> {
-        self.energy_densities_of_points(u)
-    }
-
-    fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
-        self.remembered_by_points()
-    }
-
-    fn stress_of_cell(&self, cell: usize, u: &[f64]) -> Option<PlaceStress> {
-        self.elements.as_ref()?.stress(self.model, cell, u)
-    }
-
-    fn energy_of_cell(&self, cell: usize, u: &[f64]) -> Option<f64> {
-        self.elements.as_ref()?.energy(self.model, cell, u)
-    }
-
-    fn remembered_by_cells(&self) -> Vec<(&'static str, Vec<(u32, f64)>)> {
-        let elements = self.elements.as_ref();
-        elements.map_or(Vec::new(), |e| e.remembered(self.model))
-    }
-
-    fn damage(&self) -> Option<Vec<f64>> {
-        let body = self.body.as_ref()?;
-        let mut points = vec![0.0; body.site_of_point.len()];
-        body.pass.damage_into(&mut points);
-        if let (Some(seam), Some(pd)) = (&self.seam, self.model.body()) {
-            seam.add_damage(&mut points, |p| reached(pd, seam.families(), p));
-        }
-        let mut damage = vec![0.0; self.mass.len()];
-        for (point, &site) in body.site_of_point.iter().enumerate() {
-            if site != NONE {
-                damage[site as usize] = points[point];
-            }
-        }
-        Some(damage)
-    }
-
-    fn damage_at_edge(&self) -> Option<usize> {
-        let body = self.body.as_ref()?;
-        if let Some(seam) = &self.seam {
-            let point = seam.damaged_at_face(body.pass.as_ref())?;
-            return Some(body.site_of_point[point as usize] as usize);
-        }
-        // asked for after every pass that broke a bond: only the points at the edge are looked at
-        body.edge
-            .iter()
-            .find(|&&p| body.pass.is_damaged(p as usize))
-            .map(|&p| body.site_of_point[p as usize] as usize)
-    }
-
-    fn damaged_sites(&self) -> Vec<u32> {
-        let Some(body) = self.body.as_ref() else {
-            return Vec::new();
-        };
-        let points = body.site_of_point.iter().enumerate();
-        points
-            .filter(|&(p, &site)| site != NONE && body.pass.is_damaged(p))
-            .map(|(_, &site)| site)
-            .collect()
-    }
-
-    fn broken_bonds(&self) -> Vec<(u32, u32)> {
-        self.broken_between_sites()
+    fn body_state(&self) -> Option<&dyn BodyState> {
+        Some(self)
     }
 
     fn damage_state(&self) -> Vec<u64> {

@@ -6,7 +6,7 @@ use super::thermal::Thermal;
 use crate::fem;
 use crate::peridynamics::{ForceState, bond_force::BondKinematics};
 use crate::scene::validated::FieldChoice;
-use crate::system::PlaceStress;
+use crate::system::{BodyState, PlaceStress};
 use crate::tensor::{Tensor, Vector};
 
 /// Name of the field of stresses; see [`Solved::stress_name`].
@@ -105,7 +105,7 @@ impl<const D: usize> Solved<'_, D> {
     ) -> Stress<D> {
         let model = self.model;
         let material = model.material_of_cell(c);
-        let told = (self.system).and_then(|system| system.stress_of_cell(c, self.displacement));
+        let told = (self.state()).and_then(|state| state.stress_of_cell(c, self.displacement));
         if let Some(told) = told {
             return self.complete(told.tensor(), told.across, material, &x);
         }
@@ -142,10 +142,7 @@ impl<const D: usize> Solved<'_, D> {
         };
         let material = material_of(p);
         let u = self.displacement;
-        if let Some(told) = self
-            .system
-            .and_then(|system| system.stress_of_site(site, u))
-        {
+        if let Some(told) = self.state().and_then(|state| state.stress_of_site(site, u)) {
             return self.complete(told.tensor(), told.across, material, &x);
         }
         if let Some(law) = self.exact_law() {
@@ -167,6 +164,11 @@ impl<const D: usize> Solved<'_, D> {
         self.complete(tensor, None, material, &x)
     }
 
+    /// The state of what has forces that are not linear.
+    pub(super) fn state(&self) -> Option<&dyn BodyState> {
+        self.system?.body_state()
+    }
+
     /// The fields that the scene asks for.
     pub(super) fn choice(&self) -> &FieldChoice {
         &self.stresses.0.output
@@ -175,7 +177,7 @@ impl<const D: usize> Solved<'_, D> {
     /// Stored energy of points per volume \[J/m^D\]; zero elsewhere.
     pub(super) fn energies_of_points(&self) -> impl Fn(&Place<'_, D>) -> f64 + Sync + '_ {
         let u = self.displacement;
-        let told = self.system.and_then(|system| system.energy_densities(u));
+        let told = self.state().and_then(|state| state.energy_densities(u));
         move |place| {
             let (Some((body, p)), Some(site)) = (place.point(), place.site()) else {
                 return 0.0;
@@ -191,7 +193,7 @@ impl<const D: usize> Solved<'_, D> {
 
     /// Stored energy of an element per volume \[J/m^D\], at a place in it: that of its law, `½ σ : ε` without thermal strains where that is linear.
     pub(super) fn energy_of_cell(&self, c: usize, place: &Place<'_, D>) -> f64 {
-        let told = (self.system).and_then(|system| system.energy_of_cell(c, self.displacement));
+        let told = (self.state()).and_then(|state| state.energy_of_cell(c, self.displacement));
         let linear = || {
             let stress = place.stress();
             let (free, across) = match self.thermal() {

@@ -55,7 +55,7 @@ pub(crate) fn unusual_stretch<const D: usize>(
 
 /// Points of a torn body whose law no longer responds.
 pub(crate) fn without_response(system: &dyn SemiDiscrete, u: &[f64]) -> Option<String> {
-    let points = system.points_without_response(u);
+    let points = system.body_state()?.points_without_response(u);
     (points > 0).then(|| {
         format!(
             "{points} points have lost so many bonds that what is left does not span their surroundings, or has turned inside out: they have no deformation gradient, carry no stress of their own, and follow the bonds of their neighbours"

@@ -291,8 +291,8 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
 
     /// What local laws remember of elements.
     fn push_remembered_by_cells(&mut self) {
-        let system = self.solved.system.into_iter();
-        for (name, values) in system.flat_map(|system| system.remembered_by_cells()) {
+        let state = self.solved.state().into_iter();
+        for (name, values) in state.flat_map(|state| state.remembered_by_cells()) {
             let values: FxHashMap<u32, f64> = values.into_iter().collect();
             let of = |spot: &Spot| match *spot {
                 Spot::Element(c) => values.get(&(c as u32)).copied().unwrap_or(0.0),

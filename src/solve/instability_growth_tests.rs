@@ -203,6 +203,10 @@ impl SemiDiscrete for Fed {
     fn seam_sites(&self) -> Vec<u32> {
         self.sites.clone()
     }
+    fn body_state(&self) -> Option<&dyn crate::system::BodyState> {
+        None
+    }
+
     fn symmetry(&self) -> Symmetry {
         Symmetry::Unsymmetric
     }

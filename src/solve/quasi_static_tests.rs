@@ -221,6 +221,10 @@ impl SemiDiscrete for Bundle {
         vec![2.0 * n, 2.0 * (n + s), 2.0 * s]
     }
 
+    fn body_state(&self) -> Option<&dyn crate::system::BodyState> {
+        None
+    }
+
     fn symmetry(&self) -> Symmetry {
         Symmetry::Symmetric
     }
@@ -505,6 +509,10 @@ impl SemiDiscrete for Hardening {
             sums[i + 1] += 2.0 * k;
         }
         sums
+    }
+
+    fn body_state(&self) -> Option<&dyn crate::system::BodyState> {
+        None
     }
 
     fn symmetry(&self) -> Symmetry {

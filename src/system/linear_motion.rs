@@ -1,6 +1,6 @@
 //! A system whose force is a matrix times its displacement.
 
-use super::{BlockCsr, FailureUpdate, Interval, SemiDiscrete, Symmetry};
+use super::{BlockCsr, BodyState, FailureUpdate, Interval, SemiDiscrete, Symmetry};
 
 /// A linear system that moves: its stiffness as a matrix, for scenes in which nothing breaks.
 #[derive(Clone, Debug)]
@@ -64,6 +64,10 @@ impl SemiDiscrete for LinearMotion {
             rows.row_offsets.push(rows.columns.len());
         }
         rows
+    }
+
+    fn body_state(&self) -> Option<&dyn BodyState> {
+        None
     }
 
     fn symmetry(&self) -> Symmetry {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::wrapped::body_of;
 use super::{
     BlockCsr, Dissipation, ElementTangent, FailureUpdate, ForceTerm, Halfway, Interval,
-    PlaceStress, SemiDiscrete,
+    SemiDiscrete,
 };
 
 /// `F_body(u) + Σ F_k(u)`: the sites of the body first, after them those that a term has of its own.
@@ -222,26 +222,6 @@ where
             v: at.v.get(..self.dofs).unwrap_or_default(),
             back: at.back,
         });
-    }
-
-    fn stress_of_site(&self, site: usize, u: &[f64]) -> Option<PlaceStress> {
-        self.body.stress_of_site(site, self.own(u))
-    }
-
-    fn energy_densities(&self, u: &[f64]) -> Option<Vec<f64>> {
-        self.body.energy_densities(self.own(u))
-    }
-
-    fn points_without_response(&self, u: &[f64]) -> usize {
-        self.body.points_without_response(self.own(u))
-    }
-
-    fn energy_of_cell(&self, cell: usize, u: &[f64]) -> Option<f64> {
-        self.body.energy_of_cell(cell, self.own(u))
-    }
-
-    fn stress_of_cell(&self, cell: usize, u: &[f64]) -> Option<PlaceStress> {
-        self.body.stress_of_cell(cell, self.own(u))
     }
 
     fn damage_state(&self) -> Vec<u64> {

@@ -18,32 +18,12 @@ macro_rules! body_of {
             self.$system.seam_sites()
         }
 
+        fn body_state(&self) -> Option<&dyn $crate::system::BodyState> {
+            self.$system.body_state()
+        }
+
         fn symmetry(&self) -> $crate::system::Symmetry {
             self.$system.symmetry()
-        }
-
-        fn remembered(&self) -> Vec<(&'static str, Vec<f64>)> {
-            self.$system.remembered()
-        }
-
-        fn remembered_by_cells(&self) -> Vec<(&'static str, Vec<(u32, f64)>)> {
-            self.$system.remembered_by_cells()
-        }
-
-        fn damage(&self) -> Option<Vec<f64>> {
-            self.$system.damage()
-        }
-
-        fn damage_at_edge(&self) -> Option<usize> {
-            self.$system.damage_at_edge()
-        }
-
-        fn damaged_sites(&self) -> Vec<u32> {
-            self.$system.damaged_sites()
-        }
-
-        fn broken_bonds(&self) -> Vec<(u32, u32)> {
-            self.$system.broken_bonds()
         }
     };
 }
@@ -96,26 +76,6 @@ macro_rules! fields_of {
 
         fn round_off(&self, u: &[f64]) -> f64 {
             self.$system.round_off(u)
-        }
-
-        fn stress_of_site(&self, site: usize, u: &[f64]) -> Option<$crate::system::PlaceStress> {
-            self.$system.stress_of_site(site, u)
-        }
-
-        fn energy_densities(&self, u: &[f64]) -> Option<Vec<f64>> {
-            self.$system.energy_densities(u)
-        }
-
-        fn points_without_response(&self, u: &[f64]) -> usize {
-            self.$system.points_without_response(u)
-        }
-
-        fn energy_of_cell(&self, cell: usize, u: &[f64]) -> Option<f64> {
-            self.$system.energy_of_cell(cell, u)
-        }
-
-        fn stress_of_cell(&self, cell: usize, u: &[f64]) -> Option<$crate::system::PlaceStress> {
-            self.$system.stress_of_cell(cell, u)
         }
     };
 }

@@ -6,6 +6,7 @@ use bondline::coupling::semidiscrete::{CoupledSystem, masses, scale_rows};
 use bondline::fem;
 use bondline::peridynamics::bond_force::BondKinematics;
 use bondline::peridynamics::{Influence, Micromodulus};
+use bondline::system::BodyState;
 use bondline::system::{FailureUpdate, Interval, SemiDiscrete};
 use bondline::tensor::Vector;
 use bondline_verify::enclosed::{Case, Cells, Enclosed, Law, Method, Widths};

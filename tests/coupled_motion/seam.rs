@@ -4,6 +4,7 @@ use super::{
     BondBehaviour, CoupledSystem, DENSITY, FailureCriterion, behaviour, case, largest, wave,
     with_motion, with_motion_by,
 };
+use bondline::system::BodyState;
 use bondline::{
     coupling::SiteKind,
     peridynamics::{Influence, Micromodulus, bond_force::BondKinematics},

@@ -1,6 +1,7 @@
 //! What each process holds, as its thread counts the bytes that it has from the allocator, and what it tells of bonds that others hold.
 #![allow(unsafe_code)]
 
+use bondline::system::BodyState;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 

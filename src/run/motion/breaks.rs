@@ -25,7 +25,8 @@ impl Breaks {
 
 /// Whether bonds may break.
 pub fn breaks<const D: usize>(system: &dyn SemiDiscrete, rest: &RunSettings<D>) -> Breaks {
-    match system.damage() {
+    let state = system.body_state();
+    match state.and_then(|state| state.damage()) {
         Some(_) if rest.breaking.damages => Breaks::Gradually,
         Some(_) if rest.breaking.fracture.is_some() => Breaks::Possibly,
         _ if system.dissipation().is_some() => Breaks::Dissipating,

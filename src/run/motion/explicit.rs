@@ -288,10 +288,12 @@ impl SegmentRecord {
             timings: Timings::default(),
             watch: Stopwatch::start(),
         };
+        let state_of_body = system.body_state();
+        let broken = state_of_body.map_or(Vec::new(), |state| state.broken_bonds());
         let between = RezoneState {
             told,
             timings: self.timings,
-            broken: BrokenBonds::of(model, &system.broken_bonds()),
+            broken: BrokenBonds::of(model, &broken),
             spent: system.dissipation(),
             leaving: Leaving::of(model, system, state),
             nonlocal,

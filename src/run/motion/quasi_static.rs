@@ -422,7 +422,9 @@ impl<const D: usize> LoadStepObserver<'_, D> {
     /// Looks for damage at the edge of the nonlocal zone, as long as there is none.
     fn find_damage_at_edge(&mut self, seen: &LoadStep<'_>) {
         if self.breaks.may() && self.edge.is_none() {
-            self.edge = seen.system.damage_at_edge().map(|site| EdgeReached {
+            let state = seen.system.body_state();
+            let site = state.and_then(|state| state.damage_at_edge());
+            self.edge = site.map(|site| EdgeReached {
                 step: self.state.step,
                 time: self.state.time,
                 site: site as u64,

@@ -278,7 +278,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
             return;
         }
         let state = motion.state();
-        let arrived = self.edge.is_none() && motion.system().damage_at_edge().is_some();
+        let arrived = self.edge.is_none() && damage_at_edge(motion.system()).is_some();
         let [due, whole] = monitor.looks_after(state.step).map(|due| due || arrived);
         if due {
             let left = self.segment.pace.steps - state.step;
@@ -402,7 +402,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         }
         self.known_broken = broken;
         motion.learn_breaks_at_edge();
-        self.edge = motion.system().damage_at_edge().map(|site| EdgeReached {
+        self.edge = damage_at_edge(motion.system()).map(|site| EdgeReached {
             step,
             time,
             site: site as u64,
@@ -570,6 +570,11 @@ pub fn moment<'m>(motion: &'m Explicit<'_>, is_linear: bool) -> Moment<'m> {
         supports: (motion.external_force(), motion.applied()),
         forces: (motion.internal_force(), motion.external_force()),
     }
+}
+
+/// Site at which damage has reached the edge of the region where bonds can break.
+fn damage_at_edge(system: &dyn crate::system::SemiDiscrete) -> Option<usize> {
+    system.body_state()?.damage_at_edge()
 }
 
 #[cfg(test)]

@@ -66,7 +66,8 @@ impl Tables {
         if options.writes() {
             self.tips.iter_mut().try_for_each(History::begin)?;
         }
-        let Some(damage) = system.damage().filter(|_| may_be_damaged) else {
+        let body = system.body_state().filter(|_| may_be_damaged);
+        let Some(damage) = body.and_then(|body| body.damage()) else {
             return Ok(());
         };
         for (tip, table) in output.tips.iter().zip(&mut self.tips) {

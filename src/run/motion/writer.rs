@@ -77,7 +77,7 @@ impl Moment<'_> {
     pub fn broken_bonds(&self) -> Vec<(u32, u32)> {
         match self.state.broken {
             0 => Vec::new(),
-            _ => self.system.broken_bonds(),
+            _ => (self.system.body_state()).map_or(Vec::new(), |state| state.broken_bonds()),
         }
     }
 }
@@ -307,7 +307,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
     /// Damage of a moment, where bonds may break or lose their stiffness.
     pub fn damage(&self, moment: &Moment<'_>) -> Option<Vec<f64>> {
         match self.breaks {
-            Breaks::Possibly | Breaks::Gradually => moment.system.damage(),
+            Breaks::Possibly | Breaks::Gradually => moment.system.body_state()?.damage(),
             Breaks::Never | Breaks::Dissipating => None,
         }
     }
@@ -334,7 +334,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
             return Ok(());
         }
         let begun = Instant::now();
-        let remembered = moment.system.remembered();
+        let state = moment.system.body_state();
+        let remembered = state.map_or(Vec::new(), |state| state.remembered());
         let remembered: Vec<Remembered<'_>> = remembered
             .iter()
             .map(|(name, values)| (*name, values.as_slice()))

@@ -210,7 +210,8 @@ impl<'a, const D: usize> ZoneMonitor<'a, D> {
             return None;
         }
         let mut damaged = vec![false; cells];
-        for site in system.damaged_sites() {
+        let state = system.body_state();
+        for site in state.map_or(Vec::new(), |state| state.damaged_sites()) {
             self.mark_point(site, &mut damaged);
         }
         let reach = self.follow.reach;

@@ -81,7 +81,9 @@ pub(super) fn part<const D: usize>(
         stiffness: proved.stiffness,
         conditions: &proved.rest.conditions,
         holder: holders(model, &proved.rest.conditions)?,
-        damaged: proved.system.map_or(Vec::new(), |s| s.damaged_sites()),
+        damaged: (proved.system)
+            .and_then(|system| system.body_state())
+            .map_or(Vec::new(), |state| state.damaged_sites()),
         has_points_alone: model.sites.iter().all(is_point),
         spread: model.spread(proved.ranks),
     };

@@ -19,7 +19,7 @@ use bondline::peridynamics::Micromodulus;
 use bondline::peridynamics::bond_force::BondKinematics;
 use bondline::progress::{Progress, Silent};
 use bondline::solve::statics::{self, StaticParams, StaticProblem};
-use bondline::system::{FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry};
+use bondline::system::{BodyState, FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry};
 use bondline::tensor::{Vector, padded};
 
 const METHODS: [Method; 7] = [
