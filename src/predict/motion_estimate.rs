@@ -24,13 +24,12 @@ use crate::run::motion::impact::impacted;
 use crate::run::motion::impact_record::ImpactRecord;
 use crate::run::motion::saved::StepChoice;
 use crate::run::motion::setup::{ModelSetup, laid_out};
-use crate::run::motion::step_observer::moment;
 use crate::run::motion::time_dependent_loads::SceneDrive;
 use crate::run::motion::time_step::{held, paced};
 use crate::run::motion::writer::{Moment, Recorder};
 use crate::run::proof::growth::{GrowthQuestion, free_start};
 use crate::run::setup::RunSettings;
-use crate::run::solution::{self, Solved};
+use crate::run::solution::{self, Moved, Solved};
 use crate::run::{RunError, RunOptions};
 use crate::scene::spec::LoadStepSpec;
 use crate::scene::{Explicit as Spec, QuasiStatic, Solve};
@@ -154,7 +153,7 @@ fn seconds_per_step(
     let mut tried = TRIED_FOR;
     while taken < steps && (taken < 2 * WARM || clock.elapsed().as_secs_f64() < tried) {
         motion.step()?;
-        moment(motion, is_linear);
+        Moment::of(motion, is_linear);
         taken += 1;
         if taken == WARM {
             let run = clock.elapsed().as_secs_f64() / WARM as f64 * steps as f64;
@@ -228,12 +227,13 @@ impl OutputCost {
                 model,
                 operator,
                 displacement: &u,
-                velocity: Some(&u),
-                damage: None,
                 residual: &[],
                 zone_of_site: &solution::zone_of_site(model),
                 system: None,
-                broken: &[],
+                moved: Moved {
+                    velocity: Some(&u),
+                    ..Moved::default()
+                },
                 sections: &[],
                 stresses: (&rest.stresses, 0.0),
             };
@@ -301,7 +301,7 @@ fn steps<const D: usize>(
     )?;
     let seconds_per_step = seconds_per_step(&mut motion, pace.steps, is_linear)?;
 
-    let shown = moment(&motion, is_linear);
+    let shown = Moment::of(&motion, is_linear);
     let operator = laid_out.operator;
     let cost = OutputCost::of(
         model,

@@ -28,7 +28,7 @@ use crate::run::equilibrium;
 use crate::run::loads;
 use crate::run::proof::{self, Subject};
 use crate::run::setup::{self, RunSettings};
-use crate::run::solution::{self, Solved};
+use crate::run::solution::{self, Moved, Solved};
 use crate::run::warnings::{doubts, of_elements, unusual_stretch};
 use crate::scene::Scene;
 use crate::scene::spec::{CouplingTraits, ZonesNeeded};
@@ -258,12 +258,10 @@ fn seconds_of_output<const D: usize>(
         model,
         operator,
         displacement: &displacement,
-        velocity: None,
-        damage: None,
         residual: &displacement,
         zone_of_site: &zones,
         system: None,
-        broken: &[],
+        moved: Moved::default(),
         sections: &[],
         stresses: (&rest.stresses, 0.0),
     };

@@ -13,6 +13,7 @@
 //! | `equilibrium.rs`, `solution.rs` | assembly, conditions and solution of a static system |
 //! | `statics.rs`, `motion/` | the sequence of a static run; scenes in time and load steps, checkpoints |
 //! | `results.rs` | a solution that a program keeps: fields and tables by name |
+//! | `intact.rs` | bonds between points that stand |
 //! | `solution_samples.rs` | a solution along lines and at probes, as tables |
 //! | `samples.rs` | displacements of a static scene at places, for studies of convergence |
 //! | `linear.rs` | the model alone, for studies of stiffness, eigenvalues and waves |
@@ -41,6 +42,7 @@ pub mod equilibrium;
 pub(crate) mod error;
 mod field_probes;
 pub mod fields;
+mod intact;
 mod linear;
 mod linear_parts;
 pub mod loads;
@@ -75,6 +77,6 @@ pub use linear::{LinearModel, SceneModel};
 pub use motion::{RunOptions, StartFrom};
 pub use results::{BuildError, Frame, NoSuchField, Solution, Table};
 pub use samples::Samples;
-pub use solution::Solved;
+pub use solution::{Moved, Solved};
 pub use statics::solve_with;
 pub use write::write;

@@ -5,6 +5,17 @@ use crate::observe::summary::SectionForce;
 use crate::run::stress_settings::StressSettings;
 use crate::system::SemiDiscrete;
 
+/// Motion and damage of a scene in time or load steps.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Moved<'a> {
+    /// Velocity, `D` numbers per site; none at rest.
+    pub velocity: Option<&'a [f64]>,
+    /// Damage of each site; none where nothing can break.
+    pub damage: Option<&'a [f64]>,
+    /// Broken bonds by the sites of their ends, each once for each direction.
+    pub broken: &'a [(u32, u32)],
+}
+
 /// A solved scene.
 pub struct Solved<'a, const D: usize> {
     /// The model.
@@ -13,18 +24,14 @@ pub struct Solved<'a, const D: usize> {
     pub operator: &'a dyn Operator<D>,
     /// Displacement, `D` numbers per site.
     pub displacement: &'a [f64],
-    /// Velocity, likewise; none of a scene without time.
-    pub velocity: Option<&'a [f64]>,
-    /// Damage of each site; none where nothing can break.
-    pub damage: Option<&'a [f64]>,
     /// Residual `K u − f` of each dof; on prescribed dofs the reaction.
     pub residual: &'a [f64],
     /// Which zone each site lies in.
     pub zone_of_site: &'a [Zone],
     /// What has forces that are not linear, or moves; none of a linear static scene.
     pub system: Option<&'a dyn SemiDiscrete>,
-    /// Bonds that broke in motion, by the sites of their ends, each once for each direction.
-    pub broken: &'a [(u32, u32)],
+    /// What moves and breaks.
+    pub moved: Moved<'a>,
     /// Forces in the sections that the scene asks for.
     pub sections: &'a [SectionForce],
     /// What of the stress is thermal and what is made of it, and the time.
@@ -48,4 +55,13 @@ pub fn zone_of_site<const D: usize>(model: &Model<D>) -> Vec<Zone> {
             SiteKind::Node(_) => node_zone(site),
         })
         .collect()
+}
+
+/// 0 local, 1 transition, 2 nonlocal.
+pub(super) fn label(zone: Zone) -> u8 {
+    match zone {
+        Zone::Local => 0,
+        Zone::Transition => 1,
+        Zone::Nonlocal => 2,
+    }
 }

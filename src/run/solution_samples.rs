@@ -1,9 +1,8 @@
 //! A solution at places between its nodes and points: tables along lines and at probes.
 
-use rustc_hash::FxHashSet;
-
 use super::fields::columns::{self, Rows};
 use super::fields::place::{Place, Shared};
+use super::intact::Intact;
 use super::solution::Solved;
 use crate::fem::{self, Locator};
 use crate::scene::validated::FieldChoice;
@@ -11,7 +10,7 @@ use crate::shape::Shape;
 use crate::system::Ranks;
 use crate::tensor::{Tensor, Vector};
 use crate::{
-    coupling::{Carrier, Sampler, SiteKind, Zone},
+    coupling::{Carrier, Sampler},
     parallel,
 };
 
@@ -125,38 +124,6 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
             let numbers = fields.at(Some(&place));
             x.iter().copied().chain(numbers).collect()
         })
-    }
-}
-
-/// 0 local, 1 transition, 2 nonlocal.
-pub(super) fn label(zone: Zone) -> u8 {
-    match zone {
-        Zone::Local => 0,
-        Zone::Transition => 1,
-        Zone::Nonlocal => 2,
-    }
-}
-
-/// Which bonds between points stand.
-pub(super) struct Intact(FxHashSet<(u32, u32)>);
-
-impl Intact {
-    pub fn of<const D: usize>(solved: &Solved<'_, D>) -> Self {
-        let sites = &solved.model.sites;
-        let point = |site: u32| match sites[site as usize].kind {
-            SiteKind::Point(p) => Some(p),
-            SiteKind::Node(_) => None,
-        };
-        let broken = solved.broken.iter();
-        Self(
-            broken
-                .filter_map(|&(i, j)| point(i).zip(point(j)))
-                .collect(),
-        )
-    }
-
-    pub(super) fn is_intact(&self, i: usize, j: usize) -> bool {
-        self.0.is_empty() || !self.0.contains(&(i as u32, j as u32))
     }
 }
 

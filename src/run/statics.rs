@@ -7,7 +7,7 @@ use super::proof::{self, Subject};
 use super::rotation::Rotations;
 use super::sections::Sections;
 use super::setup::{RunSettings, model_choices, problem, same_everywhere, shared_model};
-use super::solution::{Solved, zone_of_site};
+use super::solution::{Moved, Solved, zone_of_site};
 use super::zone_placement::{CachedSolution, difference_from_elements};
 use crate::run::placed_scene::PlacedScene;
 use std::path::PathBuf;
@@ -158,12 +158,10 @@ fn solve_chosen<const D: usize>(
         model,
         operator: operator.as_ref(),
         displacement: &equilibrium.solution.displacement,
-        velocity: None,
-        damage: None,
         residual: &residual,
         zone_of_site: &zone_of_site(model),
         system: system.as_ref().map(|s| s as &dyn SemiDiscrete),
-        broken: &[],
+        moved: Moved::default(),
         sections: &sections,
         stresses: (&rest.stresses, 0.0),
     };

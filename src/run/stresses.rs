@@ -1,6 +1,5 @@
 //! Stress of elements and points as outputs show it: less its thermal part, and the numbers made of it.
 
-use super::fields::place::Place;
 use super::solution::Solved;
 use super::thermal::Thermal;
 use crate::fem;
@@ -65,7 +64,7 @@ impl<const D: usize> Stress<D> {
 }
 
 impl<const D: usize> Solved<'_, D> {
-    fn thermal(&self) -> Option<(&Thermal<D>, f64)> {
+    pub(super) fn thermal(&self) -> Option<(&Thermal<D>, f64)> {
         let (settings, t) = self.stresses;
         settings.thermal.as_ref().map(|thermal| (thermal, t))
     }
@@ -174,45 +173,6 @@ impl<const D: usize> Solved<'_, D> {
         &self.stresses.0.output
     }
 
-    /// Stored energy of points per volume \[J/m^D\]; zero elsewhere.
-    pub(super) fn energies_of_points(&self) -> impl Fn(&Place<'_, D>) -> f64 + Sync + '_ {
-        let u = self.displacement;
-        let told = self.state().and_then(|state| state.energy_densities(u));
-        move |place| {
-            let (Some((body, p)), Some(site)) = (place.point(), place.site()) else {
-                return 0.0;
-            };
-            let stands = |j: usize| place.shared.intact.is_intact(p, j);
-            match (&told, self.exact_law()) {
-                (Some(told), _) => told[site],
-                (None, Some(law)) => body.exact_response(p, law, u, stands, |_| 0.0).1,
-                (None, None) => body.energy_density(p, u, stands),
-            }
-        }
-    }
-
-    /// Stored energy of an element per volume \[J/m^D\], at a place in it: that of its law, `½ σ : ε` without thermal strains where that is linear.
-    pub(super) fn energy_of_cell(&self, c: usize, place: &Place<'_, D>) -> f64 {
-        let told = (self.state()).and_then(|state| state.energy_of_cell(c, self.displacement));
-        let linear = || {
-            let stress = place.stress();
-            let (free, across) = match self.thermal() {
-                Some((thermal, t)) => {
-                    let x = self.model.mesh.centroid(c);
-                    let material = self.model.material_of_cell(c);
-                    let free = thermal.stretch_at(&x, material, t);
-                    (
-                        thermal.cell_gradient(self.model, c, t),
-                        free * thermal.solid[usize::from(material)],
-                    )
-                }
-                None => (Tensor::zeros(), 0.0),
-            };
-            0.5 * (stress.tensor.dot(&(place.gradient() - free)) - stress.across * across)
-        };
-        told.unwrap_or_else(linear)
-    }
-
     /// The name of the field of stresses: linear ones, which a rotation turns to first order only, are called so where there are no others.
     pub(super) fn stress_name(&self) -> &'static str {
         match self.has_cauchy_stresses() {
@@ -256,7 +216,7 @@ impl<const D: usize> Solved<'_, D> {
     }
 
     /// The force states of exact bonds whose stress follows from the displacement alone.
-    fn exact_law(&self) -> Option<&dyn ForceState<D>> {
+    pub(super) fn exact_law(&self) -> Option<&dyn ForceState<D>> {
         let law = &self.model.peridynamics.as_ref()?.law;
         let states = law.force_state()?;
         let is_exact = self.has_exact_bonds() && states.is_objective();

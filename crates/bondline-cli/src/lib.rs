@@ -10,7 +10,6 @@ use bondline::observe::checkpoint::Pace;
 use bondline::observe::report as tables;
 use bondline::observe::summary::Ended;
 use bondline::progress::Silent;
-use bondline::run::fields::{self, On, Wanted};
 use bondline::run::{AnyScene, RunOptions, StartFrom};
 use bondline::scene::{self, Template};
 use bondline::system::Ranks;
@@ -21,6 +20,7 @@ use bondline_terminal::{Processes, TerminalProgress, print, refuse_several, repo
 use clap::builder::PossibleValuesParser;
 use clap::{Parser, Subcommand, ValueEnum};
 
+use command::fields;
 use command::interrupt::{self, INTERRUPTED};
 use command::threads::{self, Oversubscribe};
 use command::verify;
@@ -509,40 +509,11 @@ fn execute(command: Command, program: std::io::Result<PathBuf>) -> miette::Resul
             let text = serde_json::to_string_pretty(&scene::schema());
             print(text.map_err(|e| miette::miette!("{e}"))?)?;
         }
-        Command::Fields => print(fields_table())?,
+        Command::Fields => print(fields::table())?,
         Command::Trade(arguments) => return traded(arguments, program),
         Command::Verify { arguments } => return verify::start(program, &arguments),
     }
     Ok(DONE)
-}
-
-/// All fields, a line each.
-fn fields_table() -> String {
-    let rows = fields::list().into_iter().map(|field| {
-        let on = match field.on {
-            On::Points => "points",
-            On::Cells => "cells",
-        };
-        let rank = format!("{:?}", field.rank).to_lowercase();
-        let key = match field.wanted {
-            Wanted::Always => "",
-            Wanted::By(key) => key,
-        };
-        [field.name, field.unit, on, &rank, key, field.text].map(str::to_owned)
-    });
-    let head = ["field", "unit", "on", "rank", "asked for by", ""].map(str::to_owned);
-    let rows: Vec<[String; 6]> = std::iter::once(head).chain(rows).collect();
-    let width = |k: usize| rows.iter().map(|row| row[k].chars().count()).max();
-    let widths: [usize; 6] = std::array::from_fn(|k| width(k).unwrap_or(0));
-    let line = |row: &[String; 6]| {
-        let cells = row.iter().zip(widths);
-        let cells = cells.map(|(cell, width)| format!("{cell:width$}"));
-        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
-    };
-    let lines = rows.iter().map(line).collect::<Vec<_>>().join("\n");
-    format!(
-        "{lines}\n\nFiles have points and cells apart: nodes and points, elements and points. What laws remember of points and elements comes beside these, by the names that the laws give."
-    )
 }
 
 fn traded(arguments: TradeArguments, program: std::io::Result<PathBuf>) -> miette::Result<u8> {

@@ -1,6 +1,6 @@
 //! Blending function.
 
-use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
+use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
 use crate::run::solution::Solved;
 
 /// Blending function.
@@ -13,8 +13,8 @@ impl<const D: usize> OutputField<D> for Beta {
             unit: "1",
             on: On::Points,
             rank: Rank::Scalar,
-            wanted: Wanted::Always,
-            columns: Columns::Never,
+            wanted: WrittenWhen::Always,
+            columns: TableColumns::Never,
             text: "Blending function: 1 where a site is peridynamic, 0 where it is local.",
         }
     }

@@ -1,7 +1,7 @@
 //! Arrays of a file and columns of a table, made of fields.
 
 use super::{
-    About, Columns, Found, On, Rank, Value, place::Place, place::Shared, place::Spot, wanted,
+    About, Found, On, Rank, TableColumns, Value, place::Place, place::Shared, place::Spot, wanted,
 };
 use crate::observe::vtu::{Field, Values};
 use crate::parallel;
@@ -74,10 +74,10 @@ fn push<const D: usize>(values: &mut Values, value: &Value<D>) {
 /// How the columns of a field begin; none where it has none.
 fn prefix(about: &About, choice: &FieldChoice) -> Option<&'static str> {
     match about.columns {
-        Columns::Never => None,
-        Columns::Always(name) => Some(name),
-        Columns::WithStresses(name) => choice.has_numbers().then_some(name),
-        Columns::Asked => Some(about.name),
+        TableColumns::Never => None,
+        TableColumns::Always(name) => Some(name),
+        TableColumns::WithStresses(name) => choice.has_numbers().then_some(name),
+        TableColumns::Asked => Some(about.name),
     }
 }
 
@@ -89,7 +89,7 @@ fn in_tables<const D: usize>(
     let fields = wanted::<D>(choice).into_iter();
     let named = fields.filter_map(|field| Some((prefix(&field.about(), choice)?, field)));
     let mut named: Vec<_> = named
-        .filter(|(_, f)| has_all || !matches!(f.about().columns, Columns::Always(_)))
+        .filter(|(_, f)| has_all || !matches!(f.about().columns, TableColumns::Always(_)))
         .collect();
     // the label of the model ends a row
     named.sort_by_key(|(_, field)| field.about().rank == Rank::Label);
@@ -115,7 +115,7 @@ pub(in crate::run) fn header<const D: usize>(choice: &FieldChoice, has_all: bool
     names
 }
 
-/// Columns of the fields of a solution at places.
+/// TableColumns of the fields of a solution at places.
 pub(in crate::run) struct Rows<'s, const D: usize> {
     found: Vec<Option<Found<'s, D>>>,
     widths: Vec<usize>,

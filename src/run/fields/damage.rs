@@ -1,6 +1,6 @@
 //! Damage.
 
-use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
+use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
 use crate::run::solution::Solved;
 
 /// Damage.
@@ -13,14 +13,14 @@ impl<const D: usize> OutputField<D> for Damage {
             unit: "1",
             on: On::Points,
             rank: Rank::Scalar,
-            wanted: Wanted::Always,
-            columns: Columns::Never,
+            wanted: WrittenWhen::Always,
+            columns: TableColumns::Never,
             text: "Share of the volume of a family whose bonds are broken, or have lost their stiffness; 0 at nodes.",
         }
     }
 
     fn of<'s>(&self, solved: &'s Solved<'s, D>) -> Option<Found<'s, D>> {
-        let damage = solved.damage?;
+        let damage = solved.moved.damage?;
         let at = |site: usize| damage[site];
         Found::new("damage", move |place| {
             Value::Scalar(place.site().map_or(0.0, at))

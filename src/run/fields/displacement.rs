@@ -1,6 +1,6 @@
 //! Displacement.
 
-use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
+use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
 use crate::run::solution::Solved;
 
 /// Displacement.
@@ -13,8 +13,8 @@ impl<const D: usize> OutputField<D> for Displacement {
             unit: "m",
             on: On::Points,
             rank: Rank::Vector,
-            wanted: Wanted::Always,
-            columns: Columns::Always("u"),
+            wanted: WrittenWhen::Always,
+            columns: TableColumns::Always("u"),
             text: "Displacement of nodes and points.",
         }
     }

@@ -1,6 +1,6 @@
 //! Energy density of points.
 
-use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
+use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
 use crate::run::solution::Solved;
 
 /// Energy density of points.
@@ -13,8 +13,8 @@ impl<const D: usize> OutputField<D> for EnergyDensity {
             unit: "J/m³",
             on: On::Points,
             rank: Rank::Scalar,
-            wanted: Wanted::By("output.energy-density"),
-            columns: Columns::Never,
+            wanted: WrittenWhen::By("output.energy-density"),
+            columns: TableColumns::Never,
             text: "Stored energy of points per volume, 0 at nodes.",
         }
     }

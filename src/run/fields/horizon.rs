@@ -1,6 +1,6 @@
 //! Horizon.
 
-use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
+use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
 use crate::coupling::Zone;
 use crate::run::solution::Solved;
 
@@ -14,8 +14,8 @@ impl<const D: usize> OutputField<D> for Horizon {
             unit: "m",
             on: On::Points,
             rank: Rank::Scalar,
-            wanted: Wanted::Always,
-            columns: Columns::Never,
+            wanted: WrittenWhen::Always,
+            columns: TableColumns::Never,
             text: "Horizon of nonlocal sites, 0 of others.",
         }
     }

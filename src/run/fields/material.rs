@@ -1,6 +1,6 @@
 //! Material of a cell.
 
-use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
+use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
 use crate::peridynamics::PdBody;
 use crate::run::solution::Solved;
 
@@ -14,8 +14,8 @@ impl<const D: usize> OutputField<D> for Material {
             unit: "1",
             on: On::Cells,
             rank: Rank::Integer,
-            wanted: Wanted::Always,
-            columns: Columns::Never,
+            wanted: WrittenWhen::Always,
+            columns: TableColumns::Never,
             text: "Number of the material, in scenes of several.",
         }
     }

@@ -9,6 +9,7 @@
 //! | `model.rs`, `material.rs`, `volume.rs` | what a cell is |
 //! | `strain.rs`, `stress.rs`, `stress_numbers.rs` | strain, stress and the numbers made of it |
 //! | `energy_density.rs`, `strain_energy_density.rs` | stored energy of points; of elements and points |
+//! | `stored_energy.rs` | the energies of both |
 //! | `place.rs` | where fields are asked for |
 //! | `columns.rs` | arrays of a file and columns of a table, made of fields |
 //!
@@ -25,6 +26,7 @@ mod model;
 pub(super) mod place;
 mod residual;
 mod size;
+mod stored_energy;
 mod strain;
 mod strain_energy_density;
 mod stress;
@@ -117,16 +119,16 @@ pub enum Rank {
 
 /// When files have a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wanted {
+pub enum WrittenWhen {
     /// Always, where a solution has it.
     Always,
     /// Where the scene asks for it, by this key.
     By(&'static str),
 }
 
-/// Columns of tables along lines and at probes.
+/// TableColumns of tables along lines and at probes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Columns {
+pub enum TableColumns {
     /// None.
     Never,
     /// Always, beginning so; of a label and a scalar the whole name.
@@ -149,9 +151,9 @@ pub struct About {
     /// Numbers at a place.
     pub rank: Rank,
     /// When it is written.
-    pub wanted: Wanted,
+    pub wanted: WrittenWhen,
     /// In tables.
-    pub columns: Columns,
+    pub columns: TableColumns,
     /// One sentence.
     pub text: &'static str,
 }
@@ -175,7 +177,7 @@ pub fn list() -> Vec<About> {
 /// Names of the fields that a scene asks for by a key.
 pub fn asked_by(key: &str) -> Vec<&'static str> {
     let all = list().into_iter();
-    all.filter(|about| matches!(about.wanted, Wanted::By(own) if own == key))
+    all.filter(|about| matches!(about.wanted, WrittenWhen::By(own) if own == key))
         .map(|about| about.name)
         .collect()
 }
@@ -187,11 +189,11 @@ fn wanted<const D: usize>(choice: &FieldChoice) -> Vec<&'static dyn OutputField<
         choice.asked.iter().position(|asked| asked == name)
     };
     let is_wanted = |field: &&'static dyn OutputField<D>| {
-        field.about().wanted == Wanted::Always || place(field).is_some()
+        field.about().wanted == WrittenWhen::Always || place(field).is_some()
     };
     let mut found: Vec<_> = all::<D>().into_iter().filter(is_wanted).collect();
     for named in found.chunk_by_mut(|a, b| {
-        a.about().wanted != Wanted::Always && b.about().wanted != Wanted::Always
+        a.about().wanted != WrittenWhen::Always && b.about().wanted != WrittenWhen::Always
     }) {
         named.sort_by_key(place);
     }

@@ -1,8 +1,7 @@
 //! Model of a cell.
 
-use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
-use crate::run::solution::Solved;
-use crate::run::solution_samples::label;
+use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
+use crate::run::solution::{Solved, label};
 
 /// Model of a cell.
 pub(super) struct ModelLabel;
@@ -14,8 +13,8 @@ impl<const D: usize> OutputField<D> for ModelLabel {
             unit: "1",
             on: On::Cells,
             rank: Rank::Label,
-            wanted: Wanted::Always,
-            columns: Columns::Always("model"),
+            wanted: WrittenWhen::Always,
+            columns: TableColumns::Always("model"),
             text: "0 local, 1 transition, 2 nonlocal.",
         }
     }

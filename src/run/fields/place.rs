@@ -4,8 +4,8 @@ use std::cell::OnceCell;
 
 use crate::coupling::{Carrier, Zone};
 use crate::peridynamics::PdBody;
+use crate::run::intact::Intact;
 use crate::run::solution::Solved;
-use crate::run::solution_samples::Intact;
 use crate::run::stresses::{Expansions, Stress};
 use crate::tensor::{Tensor, Vector};
 

@@ -1,6 +1,6 @@
 //! Force out of balance.
 
-use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
+use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
 use crate::run::solution::Solved;
 use crate::tensor::Vector;
 
@@ -14,8 +14,8 @@ impl<const D: usize> OutputField<D> for Residual {
             unit: "N",
             on: On::Points,
             rank: Rank::Vector,
-            wanted: Wanted::Always,
-            columns: Columns::Never,
+            wanted: WrittenWhen::Always,
+            columns: TableColumns::Never,
             text: "Internal less external force, on supports the reaction; of static scenes.",
         }
     }

@@ -1,6 +1,6 @@
 //! Spacing of points.
 
-use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
+use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
 use crate::run::point_cells::PointCells;
 use crate::run::solution::Solved;
 
@@ -14,8 +14,8 @@ impl<const D: usize> OutputField<D> for Size {
             unit: "m",
             on: On::Points,
             rank: Rank::Scalar,
-            wanted: Wanted::Always,
-            columns: Columns::Never,
+            wanted: WrittenWhen::Always,
+            columns: TableColumns::Never,
             text: "Edge of the cell of a point, 0 at nodes.",
         }
     }

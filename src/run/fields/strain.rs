@@ -1,6 +1,6 @@
 //! Linear strain.
 
-use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
+use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
 use crate::run::solution::Solved;
 use crate::tensor::strain;
 
@@ -14,8 +14,8 @@ impl<const D: usize> OutputField<D> for Strain {
             unit: "1",
             on: On::Cells,
             rank: Rank::Tensor,
-            wanted: Wanted::Always,
-            columns: Columns::Always("e"),
+            wanted: WrittenWhen::Always,
+            columns: TableColumns::Always("e"),
             text: "Symmetric part of the displacement gradient.",
         }
     }

@@ -1,6 +1,6 @@
 //! Strain energy density of elements and points.
 
-use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
+use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
 use crate::run::solution::Solved;
 
 /// Strain energy density of elements and points.
@@ -13,8 +13,8 @@ impl<const D: usize> OutputField<D> for StrainEnergyDensity {
             unit: "J/m³",
             on: On::Cells,
             rank: Rank::Scalar,
-            wanted: Wanted::By("output.fields"),
-            columns: Columns::Asked,
+            wanted: WrittenWhen::By("output.fields"),
+            columns: TableColumns::Asked,
             text: "Stored energy per undeformed volume: of elements by their law, of points by their force states.",
         }
     }

@@ -1,6 +1,6 @@
 //! Stress, and which of them turn with the body.
 
-use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
+use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
 use crate::run::solution::Solved;
 use crate::run::stresses;
 
@@ -14,8 +14,8 @@ impl<const D: usize> OutputField<D> for StressTensor {
             unit: "Pa",
             on: On::Cells,
             rank: Rank::Tensor,
-            wanted: Wanted::Always,
-            columns: Columns::WithStresses("s"),
+            wanted: WrittenWhen::Always,
+            columns: TableColumns::WithStresses("s"),
             text: "Stress without its thermal part; called linear_stress in a scene whose stresses are linear throughout.",
         }
     }
@@ -35,8 +35,8 @@ impl<const D: usize> OutputField<D> for StressMeasure {
             unit: "1",
             on: On::Cells,
             rank: Rank::Label,
-            wanted: Wanted::Always,
-            columns: Columns::Never,
+            wanted: WrittenWhen::Always,
+            columns: TableColumns::Never,
             text: "1 for a Cauchy stress, 0 for a linear one; where some stresses turn with the body.",
         }
     }

@@ -1,6 +1,6 @@
 //! Numbers made of the stress.
 
-use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
+use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
 use crate::run::solution::Solved;
 use crate::run::stresses::von_mises;
 
@@ -39,8 +39,8 @@ impl<const D: usize> OutputField<D> for StressNumber {
             unit: "Pa",
             on: On::Cells,
             rank: Rank::Scalar,
-            wanted: Wanted::By("output.stresses"),
-            columns: Columns::Asked,
+            wanted: WrittenWhen::By("output.stresses"),
+            columns: TableColumns::Asked,
             text: self.text,
         }
     }

@@ -1,6 +1,6 @@
 //! Velocity of a scene in motion.
 
-use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
+use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
 use crate::run::solution::Solved;
 
 /// Velocity of a scene in motion.
@@ -13,14 +13,14 @@ impl<const D: usize> OutputField<D> for Velocity {
             unit: "m/s",
             on: On::Points,
             rank: Rank::Vector,
-            wanted: Wanted::Always,
-            columns: Columns::Never,
+            wanted: WrittenWhen::Always,
+            columns: TableColumns::Never,
             text: "Velocity, in scenes in time.",
         }
     }
 
     fn of<'s>(&self, solved: &'s Solved<'s, D>) -> Option<Found<'s, D>> {
-        let velocity = solved.velocity?;
+        let velocity = solved.moved.velocity?;
         Found::new("velocity", |place| Value::Vector(place.vector(velocity)))
     }
 }

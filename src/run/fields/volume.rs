@@ -1,6 +1,6 @@
 //! Volume of a cell.
 
-use super::{About, Columns, Found, On, OutputField, Rank, Value, Wanted};
+use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
 use crate::fem;
 use crate::run::solution::Solved;
 
@@ -14,8 +14,8 @@ impl<const D: usize> OutputField<D> for Volume {
             unit: "m³",
             on: On::Cells,
             rank: Rank::Scalar,
-            wanted: Wanted::Always,
-            columns: Columns::Never,
+            wanted: WrittenWhen::Always,
+            columns: TableColumns::Never,
             text: "Volume of an element or of a point.",
         }
     }

@@ -33,3 +33,8 @@ pub fn breaks<const D: usize>(system: &dyn SemiDiscrete, rest: &RunSettings<D>) 
         _ => Breaks::Never,
     }
 }
+
+/// Site at which damage has reached the edge of the region where bonds can break.
+pub fn damage_at_edge(system: &dyn SemiDiscrete) -> Option<usize> {
+    system.body_state()?.damage_at_edge()
+}

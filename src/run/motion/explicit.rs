@@ -10,7 +10,8 @@ use super::rezoning::{Leaving, share};
 use super::saved::{Saved, SavedZone};
 use super::setup::{ModelSetup, RunSetup, begun, lay_out, opened};
 use super::sharing::sharing;
-use super::step_observer::{Segment, StepObserver, Stop, Watched, moment};
+use super::step_observer::{Segment, StepObserver, Stop, Watched};
+use super::writer::Moment;
 use crate::coupling::{BrokenBonds, Model, Operator, SiteKind, Zone};
 use crate::observe::checkpoint::{CheckpointError, CheckpointFile};
 use crate::observe::cracks::CrackSummary;
@@ -387,7 +388,7 @@ fn motion_summary<const D: usize>(
     let Segment {
         model, rest, pace, ..
     } = *observer.segment;
-    let moment = moment(motion, observer.segment.is_linear);
+    let moment = Moment::of(motion, observer.segment.is_linear);
     let state = moment.state;
     let stored = moment.system.stored_energy(&state.u);
     let plane = plane_energy(model, rest)?;

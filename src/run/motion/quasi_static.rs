@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use super::RunOptions;
-use super::breaks::{Breaks, breaks};
+use super::breaks::{Breaks, breaks, damage_at_edge};
 use super::doubtful_equilibria::DoubtfulEquilibria;
 use super::dynamic_system::{failing_stretch, plane_energy, start};
 use super::explicit::{cracks, inelastic_energy, sizes};
@@ -422,9 +422,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
     /// Looks for damage at the edge of the nonlocal zone, as long as there is none.
     fn find_damage_at_edge(&mut self, seen: &LoadStep<'_>) {
         if self.breaks.may() && self.edge.is_none() {
-            let state = seen.system.body_state();
-            let site = state.and_then(|state| state.damage_at_edge());
-            self.edge = site.map(|site| EdgeReached {
+            self.edge = damage_at_edge(seen.system).map(|site| EdgeReached {
                 step: self.state.step,
                 time: self.state.time,
                 site: site as u64,

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::RunOptions;
-use super::breaks::Breaks;
+use super::breaks::{Breaks, damage_at_edge};
 use super::dynamic_system::{failing_stretch, failure_criterion};
 use super::guard::{Balance, Guard};
 use super::saved::{EdgeReached, SavedZone, StepChoice};
@@ -22,7 +22,7 @@ use crate::run::linear_parts::{LinearParts, RunKind};
 use crate::run::pieces::Piece;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
-use crate::run::solution::{self, Solved};
+use crate::run::solution::{self, Moved, Solved};
 use crate::run::stress_settings::StressSettings;
 use crate::run::surface_gradient::{Asked, steep_stresses};
 use crate::scene::solve::Explicit as Spec;
@@ -122,12 +122,14 @@ impl<'a, const D: usize> FieldOutput<'a, D> {
             model: self.model,
             operator: self.operator,
             displacement: &moment.state.u,
-            velocity: Some(&moment.state.v),
-            damage,
             residual: &[],
             zone_of_site: &self.zone_of_site,
             system: Some(moment.system),
-            broken,
+            moved: Moved {
+                velocity: Some(&moment.state.v),
+                damage,
+                broken,
+            },
             sections: &[],
             stresses: (self.stresses, moment.state.time),
         }
@@ -243,7 +245,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         resumed: bool,
         due: bool,
     ) -> Result<(), ObserveError> {
-        let moment = moment(motion, self.segment.is_linear);
+        let moment = Moment::of(motion, self.segment.is_linear);
         if !resumed {
             self.recorder.begin(&moment);
             let energies = self.recorder.energies(&moment);
@@ -333,7 +335,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
             // the run may end here, or look at the zone
             motion.gather();
         }
-        let moment = moment(motion, self.segment.is_linear);
+        let moment = Moment::of(motion, self.segment.is_linear);
         if let Some(impact) = &mut self.recorder.impact {
             impact.watch(moment.state, moment.supports.0);
         }
@@ -557,24 +559,6 @@ struct DueOutput {
     must_save: bool,
     /// Whether the zone changes: a checkpoint is then one of the next layout.
     changes: bool,
-}
-
-/// The present moment of a run, as tables write it.
-pub fn moment<'m>(motion: &'m Explicit<'_>, is_linear: bool) -> Moment<'m> {
-    let energies = motion.energies();
-    Moment {
-        state: motion.state(),
-        system: motion.system(),
-        kinetic: energies.kinetic,
-        discrete: is_linear.then_some(energies.discrete),
-        supports: (motion.external_force(), motion.applied()),
-        forces: (motion.internal_force(), motion.external_force()),
-    }
-}
-
-/// Site at which damage has reached the edge of the region where bonds can break.
-fn damage_at_edge(system: &dyn crate::system::SemiDiscrete) -> Option<usize> {
-    system.body_state()?.damage_at_edge()
 }
 
 #[cfg(test)]

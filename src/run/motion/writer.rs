@@ -31,7 +31,7 @@ use crate::run::solution::Solved;
 use crate::run::write::{Remembered, Shown, snapshot};
 use crate::scene::conditions::Condition;
 use crate::scene::validated::Output;
-use crate::solve::explicit::State;
+use crate::solve::explicit::{Explicit, State};
 use crate::system::SemiDiscrete;
 use crate::tensor::Vector;
 
@@ -72,7 +72,20 @@ impl<'a> Moment<'a> {
     }
 }
 
-impl Moment<'_> {
+impl<'m> Moment<'m> {
+    /// The present moment of a motion.
+    pub fn of(motion: &'m Explicit<'_>, is_linear: bool) -> Self {
+        let energies = motion.energies();
+        Self {
+            state: motion.state(),
+            system: motion.system(),
+            kinetic: energies.kinetic,
+            discrete: is_linear.then_some(energies.discrete),
+            supports: (motion.external_force(), motion.applied()),
+            forces: (motion.internal_force(), motion.external_force()),
+        }
+    }
+
     /// Broken bonds by the sites of their ends, each once for each direction.
     pub fn broken_bonds(&self) -> Vec<(u32, u32)> {
         match self.state.broken {

@@ -2,10 +2,12 @@
 //!
 //! | file | what |
 //! |---|---|
+//! | `fields.rs` | the list of fields |
 //! | `interrupt.rs` | signals |
 //! | `threads.rs` | how many threads compute |
 //! | `verify.rs` | the program of the suites, which is built apart |
 
+pub mod fields;
 pub mod interrupt;
 pub mod threads;
 pub mod verify;
