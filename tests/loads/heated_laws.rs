@@ -50,17 +50,31 @@ fn scene(
 ) -> String {
     let dimension = kinematics.dimension();
     let axes = &["x", "y", "z"][..dimension];
-    let (mesh, zone, probe) = match dimension {
-        2 => (
-            "rectangle = { min = [0, 0], max = [2.2, 1.8], x = { cells = 11 }, y = { cells = 9 } }",
-            "min = [0.6, 0.6], max = [1.2, 1.2]",
-            "[0.9, 0.9]",
-        ),
-        _ => (
-            "box = { min = [0, 0, 0], max = [1.4, 1.4, 1.4], x = { cells = 7 }, y = { cells = 7 }, z = { cells = 7 } }",
-            "min = [0.4, 0.4, 0.4], max = [0.8, 0.8, 0.8]",
-            "[0.7, 0.7, 0.7]",
-        ),
+    // without a seam a family and what holds it are enough
+    let cells = match (dimension, coupling) {
+        (2, "local" | "nonlocal") => [5, 9, 0],
+        (2, _) => [11, 9, 0],
+        (_, "local" | "nonlocal") => [5, 5, 7],
+        _ => [7, 7, 7],
+    };
+    let cells = &cells[..dimension];
+    let size: Vec<f64> = cells.iter().map(|n| f64::from(*n) * 0.2).collect();
+    let shape = if dimension == 2 { "rectangle" } else { "box" };
+    let along = axes.iter().zip(cells);
+    let along: String = along
+        .map(|(a, n)| format!(", {a} = {{ cells = {n} }}"))
+        .collect();
+    let mesh = format!(
+        "{shape} = {{ min = {:?}, max = {size:?}{along} }}",
+        vec![0.0; dimension]
+    );
+    let zone = match dimension {
+        2 => "min = [0.6, 0.6], max = [1.2, 1.2]",
+        _ => "min = [0.4, 0.4, 0.4], max = [0.8, 0.8, 0.8]",
+    };
+    let probe = match coupling {
+        "local" | "nonlocal" => size.iter().map(|x| 0.5 * x).collect(),
+        _ => vec![if dimension == 2 { 0.9 } else { 0.7 }; dimension],
     };
     let peridynamics = match coupling {
         "local" => String::new(),
@@ -81,9 +95,15 @@ fn scene(
             let zero = zero.collect::<Vec<_>>().join(", ");
             let held = match way {
                 // some freedom sets the step in time, away from the family of the probe
-                Way::InTime if dimension == 2 => "box = { min = [-1, -1], max = [3, 1.65] }",
-                Way::InTime => "box = { min = [-1, -1, -1], max = [3, 3, 1.25] }",
-                Way::AtRest | Way::LoadSteps => "everywhere = true",
+                Way::InTime => {
+                    let mut top = vec![3.0; dimension];
+                    top[dimension - 1] = size[dimension - 1] - 0.15;
+                    format!(
+                        "box = {{ min = {:?}, max = {top:?} }}",
+                        vec![-1.0; dimension]
+                    )
+                }
+                Way::AtRest | Way::LoadSteps => "everywhere = true".to_owned(),
             };
             format!("conditions.all.displacement = {{ inside.{held}, {zero} }}\n")
         }
@@ -133,7 +153,7 @@ temperature = {{ value = "{value}" }}
 [output]
 vtu = false
 stresses = ["von-mises"]
-probes.p.at = {probe}
+probes.p.at = {probe:?}
 "#,
         kinematics.name(),
         stuff
