@@ -52,9 +52,8 @@ fn scene(
     let axes = &["x", "y", "z"][..dimension];
     // without a seam a family and what holds it are enough
     let cells = match (dimension, coupling) {
-        (2, "local" | "nonlocal") => [5, 9, 0],
+        (2, "local" | "nonlocal") => [7, 9, 0],
         (2, _) => [11, 9, 0],
-        (_, "local" | "nonlocal") => [5, 5, 7],
         _ => [7, 7, 7],
     };
     let cells = &cells[..dimension];
