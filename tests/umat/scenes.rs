@@ -174,6 +174,31 @@ fn a_routine_gives_our_own_plasticity_in_elements_and_at_points() {
 }
 
 #[test]
+fn a_routine_that_is_heated_gives_our_own_plasticity() {
+    let folder = tempfile::tempdir().unwrap();
+    let library = in_c(folder.path(), "j2.c");
+    for coupling in ["local", "nonlocal", "splice"] {
+        let held = PULLED
+            .replace("{coupling}", coupling)
+            .replace("{pull}", "0")
+            .replace("{steps}", "6");
+        let hot = |material: &str| {
+            let material = format!("{material}thermal-expansion = 1e-3");
+            let scene = held.replace("{material}", &material);
+            history(
+                folder.path(),
+                &format!("temperature.value = \"12*t\"\n{scene}"),
+            )
+        };
+        let (own, found) = (hot(OWN), hot(&routine(&library, "")));
+        let (off, size) = difference(&own, &found, "reaction");
+        assert!(off < 1e-10, "{coupling}: {off:e}");
+        // it flows: less than E α ΔT
+        assert!(size > 5.0 && size < 11.0, "{coupling}: {size}");
+    }
+}
+
+#[test]
 fn large_strains_are_the_rate_form_of_a_bar() {
     let folder = tempfile::tempdir().unwrap();
     let library = in_c(folder.path(), "j2.c");
