@@ -37,7 +37,7 @@ pub struct BrokenBonds<const D: usize> {
 }
 
 impl<const D: usize> BrokenBonds<D> {
-    /// The bonds of a layout by the sites of their ends, each once for each direction, as [`crate::system::SemiDiscrete::broken_bonds`] gives them.
+    /// The bonds of a layout by the sites of their ends, each once for each direction, as [`crate::system::BodyState::broken_bonds`] gives them.
     pub fn of(model: &Model<D>, bonds: &[(u32, u32)]) -> Self {
         let at = |site: u32| key(&model.sites[site as usize].position);
         let mut of: FxHashMap<Key<D>, FxHashSet<Key<D>>> = FxHashMap::default();

@@ -10,7 +10,7 @@ const OWN: usize = 4;
 
 /// A law of solids whose stress is that of what is left of the deformation beyond a free stretch `s = α ΔT`.
 ///
-/// Strains of any size: `F_m = F/(1 + s)`, and W is an energy of the expanded body, `W = (1 + s)³ W_m(F_m)`, so that the Cauchy stress is the one of the law at `F_m` and `P = (1 + s)² P_m` ([BoleyWeiner1960] for small strains).
+/// Strains of any size: `F_m = F/(1 + s)`, and W is an energy of the expanded body, `W = (1 + s)³ W_m(F_m)`, so that the Cauchy stress is the one of the law at `F_m` and `P = (1 + s)² P_m` (\[BoleyWeiner1960\] for small strains).
 /// Small strains: `σ = σ_m(ε − s I)`. At a deformation that is held, the energy changes with the temperature by `∂W/∂s = 3 (1 + s)² W_m − (1 + s) P_m : F`, for small strains `−tr σ`; the work of heating is its sum by the trapezoidal rule.
 ///
 /// Whoever knows the temperature writes s to the number [`LocalHistory::free_stretch`] of what a point remembers. Within [`Reduced`](super::Reduced) the strain out of the body expands too.

@@ -13,7 +13,7 @@
 //! | `place.rs` | where fields are asked for |
 //! | `columns.rs` | arrays of a file and columns of a table, made of fields |
 //!
-//! A field that implements [`OutputField`] and has its line in [`all`] is written wherever it is asked for: no other place names it. What laws remember ([`crate::peridynamics::HistoryLayout`]) is written beside them, by the names that the laws give.
+//! A field that implements `OutputField` and has its line in `all` is written wherever it is asked for: no other place names it. What laws remember ([`crate::peridynamics::HistoryLayout`]) is written beside them, by the names that the laws give.
 
 mod beta;
 pub(super) mod columns;
