@@ -1,6 +1,7 @@
 //! What every scene that moves begins with: the model, its rows and bonds, and the checkpoint that it goes on from.
 
 use super::dynamic_system::{DynamicSystem, LayoutStart, dynamic};
+use super::guard::energies_are_apart;
 use super::saved::Saved;
 use super::sharing::Sharing;
 use super::{RunOptions, StartFrom};
@@ -116,6 +117,7 @@ pub(crate) fn lay_out<const D: usize, T>(
         &mut choices,
         progress,
     )?;
+    choices.extend(without_balance(&model, rest, moving.is_linear));
     let of = (start.ranks, moving.system.as_ref());
     let proved = growth::proved(&model, operator.as_ref(), of, progress);
     watch.lap(&mut timings, "rows and bonds");
@@ -248,4 +250,16 @@ fn read(
         },
     });
     Ok(Some(saved))
+}
+
+/// Energies of a scene with a temperature that do not add up, if any do not.
+fn without_balance<const D: usize>(
+    model: &Model<D>,
+    rest: &RunSettings<D>,
+    is_linear: bool,
+) -> Option<Decision> {
+    energies_are_apart(model, rest, is_linear).then(|| Decision {
+        choice: "energies that do not add up to a balance".to_owned(),
+        why: "temperature: its forces on linear elements do work as loads do, bonds and laws that know it store mechanical energy alone".to_owned(),
+    })
 }
