@@ -68,7 +68,7 @@ pub struct CoupledSystem<'a, const D: usize> {
     energy: ElementEnergy,
     /// Elements whose law is not linear, if there are any.
     elements: Option<LocalElements<D>>,
-    /// How elements expand whose law does so by itself; none where nothing expands.
+    /// Free expansion of elements whose law expands by itself; none where nothing expands.
     heat: Option<FreeStretch<D>>,
     /// Who computes which sites, where several processes do.
     split: Option<split::Split<'a>>,

@@ -378,7 +378,7 @@ fn each_element<const D: usize>(
     }
 }
 
-/// What an element has beyond the linear one, which expands by the same displacements of its nodes; overwrites what its points remember at present, and its nodal forces \[N\].
+/// Excess of an element over the linear one, which expands by the same displacements of its nodes; overwrites what its points remember at present, and its nodal forces \[N\].
 fn excess<const D: usize>(
     mesh: &Mesh<D>,
     element: &Element,

@@ -200,7 +200,7 @@ impl<const D: usize> LocalResponse<D> {
     }
 }
 
-/// What a local law remembers of a point; all numbers are zero at the start.
+/// Memory of a local law at a point; all numbers are zero at the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LocalHistory {
     /// The names of the numbers. Those without a name are not shown.
@@ -209,7 +209,7 @@ pub struct LocalHistory {
     pub damage: Option<usize>,
     /// Which of them is the free stretch `α ΔT`, for the owner of a temperature to write before each response; none of a law that does not expand by itself.
     pub free_stretch: Option<usize>,
-    /// Whether the response depends on how the deformation came about.
+    /// True of a law whose response depends on how the deformation came about.
     pub is_path_dependent: bool,
 }
 
@@ -227,12 +227,12 @@ impl LocalHistory {
         }
     }
 
-    /// How many numbers.
+    /// Count of the numbers.
     pub fn len(&self) -> usize {
         self.names.len()
     }
 
-    /// Whether nothing is remembered.
+    /// True of a law without memory.
     pub fn is_empty(&self) -> bool {
         self.names.is_empty()
     }
@@ -261,7 +261,7 @@ pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
     /// Whether it holds for strains of any size: a rotation of the deformed body rotates its stress, `P(Q F) = Q P(F)`.
     fn is_objective(&self) -> bool;
 
-    /// What it remembers of a point.
+    /// Its memory of a point.
     fn history(&self) -> LocalHistory;
 
     /// Whether it flows without a change of volume, so that cells with a dilatation at each quadrature point would resist it.

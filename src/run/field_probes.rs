@@ -7,7 +7,7 @@ use crate::coupling::{Carrier, Model, Sampler};
 use crate::scene::validated::Output;
 use crate::tensor::Vector;
 
-/// What carries each probe; nothing where no field is asked for.
+/// Carriers of the probes; none in a scene that asks for no field.
 pub(super) struct FieldProbes {
     carriers: Vec<Option<Carrier>>,
 }
@@ -39,7 +39,7 @@ impl FieldProbes {
         }
     }
 
-    /// Whether there is nothing to tell.
+    /// True of a scene without such columns.
     pub fn is_empty(&self) -> bool {
         self.carriers.is_empty()
     }

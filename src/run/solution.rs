@@ -30,7 +30,7 @@ pub struct Solved<'a, const D: usize> {
     pub zone_of_site: &'a [Zone],
     /// What has forces that are not linear, or moves; none of a linear static scene.
     pub system: Option<&'a dyn SemiDiscrete>,
-    /// What moves and breaks.
+    /// Motion and damage.
     pub moved: Moved<'a>,
     /// Forces in the sections that the scene asks for.
     pub sections: &'a [SectionForce],

@@ -161,7 +161,7 @@ const POINT_IDENTIFIER: &str = "GlobalPointIds";
 /// The field of the number of each cell.
 const CELL_IDENTIFIER: &str = "GlobalCellIds";
 
-/// What laws remember of sites: a name, and a number for each, zero at nodes that are no sites.
+/// Memory of laws at sites: a name, and a number for each, zero at nodes that are no sites.
 pub type Remembered<'a> = (&'static str, &'a [f64]);
 
 /// Cells and points with the fields of a solution; without a residual, that field is left out.
@@ -193,9 +193,9 @@ pub fn snapshot<const D: usize>(
 struct SnapshotRows<'a, const D: usize> {
     solved: &'a Solved<'a, D>,
     snapshot: Snapshot,
-    /// What each point of the file is.
+    /// Node or point behind each point of the file.
     points: Vec<Spot>,
-    /// What each cell is.
+    /// Element or point behind each cell.
     cells: Vec<Spot>,
     /// Numbers of points and of cells among those of all processes; empty where one shows all.
     identifiers: [Vec<i64>; 2],
@@ -276,7 +276,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
         }
     }
 
-    /// What laws remember of points.
+    /// Adds the memory of laws at points.
     fn push_remembered_by_sites(&mut self, remembered: &[Remembered<'_>]) {
         for (name, values) in remembered {
             let of = |spot: &Spot| match *spot {
@@ -289,7 +289,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
         }
     }
 
-    /// What local laws remember of elements.
+    /// Adds the memory of local laws in elements.
     fn push_remembered_by_cells(&mut self) {
         let state = self.solved.state().into_iter();
         for (name, values) in state.flat_map(|state| state.remembered_by_cells()) {

@@ -114,19 +114,19 @@ pub struct Solver {
 pub struct FieldChoice {
     /// Their names: first the numbers made of the stress.
     pub asked: Vec<String>,
-    /// How many of them are numbers made of the stress.
+    /// Count of those that are numbers made of the stress.
     pub stresses: usize,
     /// Whether there is a normal stress out of the plane: in plane strain.
     pub across: bool,
 }
 
 impl FieldChoice {
-    /// Whether numbers made of the stress are asked for: tables then have its components too.
+    /// True if numbers made of the stress are asked for: tables then have its components too.
     pub fn has_numbers(&self) -> bool {
         self.stresses > 0
     }
 
-    /// Whether any other field is asked for.
+    /// True if any other field is asked for.
     pub fn has_others(&self) -> bool {
         self.asked.len() > self.stresses
     }

@@ -45,7 +45,7 @@ pub trait SharedSteps {
     /// Collective: breaks the bonds that other processes broke since they were told last.
     fn learn_breaks(&mut self);
 
-    /// Whether [`super::BodyState::damage_at_edge`] may find any, and asks for the bonds of all processes.
+    /// True where [`super::BodyState::damage_at_edge`] may find any, and asks for the bonds of all processes.
     fn has_edge(&self) -> bool;
 
     /// Collective: what each process exchanged.

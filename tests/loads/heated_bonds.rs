@@ -69,6 +69,13 @@ fn same(a: &[f64], b: &[f64], within: f64, what: &str) {
     assert!(off <= within, "{what}: {a:?} {b:?}, off by {off:e}");
 }
 
+/// Reactions of two runs at the right end are the same, row by row.
+fn same_reactions(cooled: &Done, pulled: &Done, material: &str) {
+    let [cooled, pulled] =
+        [cooled, pulled].map(|done| done.column("scene_history.csv", "right_reaction_x"));
+    same(&cooled, &pulled, 1e-6 * largest(&pulled), material);
+}
+
 #[test]
 fn elements_that_cool_between_walls_are_pulled() {
     for material in &MATERIALS[MATERIALS.len() - OF_ELEMENTS..] {
@@ -91,14 +98,7 @@ fn elements_that_cool_between_walls_are_pulled() {
                 set,
             );
             let pulled = run(&without(strip(material, bonds, "1.5*8e-3*t", None)), set);
-            let reaction = |done: &Done| done.column("scene_history.csv", "right_reaction_x");
-            let scale = largest(&reaction(&pulled));
-            same(
-                &reaction(&cooled),
-                &reaction(&pulled),
-                1e-6 * scale,
-                material,
-            );
+            same_reactions(&cooled, &pulled, material);
         }
     }
 }
@@ -113,14 +113,7 @@ fn a_body_that_cools_between_walls_is_one_that_is_pulled() {
         let set: &[&str] = if is_notched { &[NOTCH] } else { &[] };
         let cooled = run(&strip(material, bonds, "0", Some("300 - 8*t")), set);
         let pulled = run(&strip(material, bonds, "1.5*8e-3*t", None), set);
-        let reaction = |done: &Done| done.column("scene_history.csv", "right_reaction_x");
-        let scale = largest(&reaction(&pulled));
-        same(
-            &reaction(&cooled),
-            &reaction(&pulled),
-            1e-6 * scale,
-            material,
-        );
+        same_reactions(&cooled, &pulled, material);
         let [hot, cold] = [&cooled, &pulled].map(|done| done.summary.motion.as_ref().unwrap());
         assert_eq!(hot.broken_bonds, cold.broken_bonds, "{material}");
         assert_eq!(

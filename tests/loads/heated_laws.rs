@@ -198,7 +198,7 @@ fn closed(kinematics: Kinematics, poisson: f64, component: &str, stretch: f64, h
     }
 }
 
-/// Whether a body that is displaced as an elastic one would expand is stressed by what relaxes out of its plane.
+/// True of a body that is displaced as an elastic one would expand, and stressed by what relaxes out of its plane.
 fn across_the_plane(kinematics: Kinematics, way: Way) -> bool {
     kinematics == Kinematics::PlaneStrain && way == Way::InTime
 }

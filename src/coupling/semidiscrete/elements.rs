@@ -18,16 +18,16 @@ pub(super) struct LocalElements<const D: usize> {
     elements: NonlinearElements<D>,
     /// Where their tangent has blocks; computed with the first one.
     pattern: OnceLock<TangentPattern>,
-    /// How they expand; none if they do not.
+    /// Free expansion; none of elements that do not expand.
     heat: Option<ElementHeat<D>>,
 }
 
-/// How elements expand, and until when they have.
+/// Free expansion of elements, and the time that they have it of.
 struct ElementHeat<const D: usize> {
     stretch: FreeStretch<D>,
     /// None where they have not that of a time.
     time: Option<f64>,
-    /// Whether they keep what they have.
+    /// True while they keep what they have.
     is_held: bool,
 }
 

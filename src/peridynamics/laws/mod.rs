@@ -123,7 +123,7 @@ pub struct Constants {
     pub kinematics: Kinematics,
     /// Density ρ [kg/m^D].
     pub density: f64,
-    /// Whether the body has a temperature, by which local laws expand.
+    /// True of a body with a temperature, by which local laws expand.
     pub is_heated: bool,
 }
 

@@ -71,7 +71,7 @@ fn push<const D: usize>(values: &mut Values, value: &Value<D>) {
     }
 }
 
-/// How the columns of a field begin; none where it has none.
+/// Beginning of the names of the columns of a field; none of one without columns.
 fn prefix(about: &About, choice: &FieldChoice) -> Option<&'static str> {
     match about.columns {
         TableColumns::Never => None,
@@ -107,15 +107,29 @@ pub(in crate::run) fn header<const D: usize>(choice: &FieldChoice, has_all: bool
             Rank::Tensor => {
                 let both = (0..D).flat_map(upper);
                 names.extend(both.map(|(i, j)| format!("{prefix}{}{}", AXES[i], AXES[j])));
-                let has_across = field.about().name == stresses::FIELD && choice.across;
-                names.extend(has_across.then(|| "szz".to_owned()));
+                let across = has_across(&field.about(), choice);
+                names.extend(across.then(|| "szz".to_owned()));
             }
         }
     }
     names
 }
 
-/// TableColumns of the fields of a solution at places.
+/// True of a tensor with a column for the component out of the plane: the stress in plane strain.
+fn has_across(about: &About, choice: &FieldChoice) -> bool {
+    about.name == stresses::FIELD && choice.across
+}
+
+/// Number of columns of a field.
+fn width<const D: usize>(about: &About, choice: &FieldChoice) -> usize {
+    match about.rank {
+        Rank::Label | Rank::Integer | Rank::Scalar => 1,
+        Rank::Vector => D,
+        Rank::Tensor => D * (D + 1) / 2 + usize::from(has_across(about, choice)),
+    }
+}
+
+/// Columns of the fields of a solution at places.
 pub(in crate::run) struct Rows<'s, const D: usize> {
     found: Vec<Option<Found<'s, D>>>,
     widths: Vec<usize>,
@@ -127,13 +141,11 @@ impl<'s, const D: usize> Rows<'s, D> {
     pub fn new(solved: &'s Solved<'s, D>, has_all: bool) -> Self {
         let choice = solved.choice();
         let fields = in_tables::<D>(choice, has_all);
-        let width = |rank: Rank| match rank {
-            Rank::Label | Rank::Integer | Rank::Scalar => 1,
-            Rank::Vector => D,
-            Rank::Tensor => D * (D + 1) / 2,
-        };
         Self {
-            widths: fields.iter().map(|(_, f)| width(f.about().rank)).collect(),
+            widths: fields
+                .iter()
+                .map(|(_, f)| width::<D>(&f.about(), choice))
+                .collect(),
             found: fields.iter().map(|(_, f)| f.of(solved)).collect(),
             has_across: choice.across,
         }
@@ -160,5 +172,32 @@ impl<'s, const D: usize> Rows<'s, D> {
             }
         }
         row
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn agree<const D: usize>(across: bool) {
+        let choice = FieldChoice {
+            asked: vec!["von-mises".to_owned(), "strain-energy-density".to_owned()],
+            stresses: 1,
+            across,
+        };
+        for has_all in [false, true] {
+            let fields = in_tables::<D>(&choice, has_all);
+            let widths = fields.iter().map(|(_, f)| width::<D>(&f.about(), &choice));
+            let names = header::<D>(&choice, has_all);
+            assert_eq!(widths.sum::<usize>(), names.len(), "{names:?}");
+        }
+    }
+
+    #[test]
+    fn a_place_that_nothing_carries_has_as_many_numbers_as_there_are_columns() {
+        agree::<1>(false);
+        agree::<2>(false);
+        agree::<2>(true);
+        agree::<3>(false);
     }
 }

@@ -122,11 +122,11 @@ pub enum Rank {
 pub enum WrittenWhen {
     /// Always, where a solution has it.
     Always,
-    /// Where the scene asks for it, by this key.
+    /// Only in scenes that ask for it, by this key.
     By(&'static str),
 }
 
-/// TableColumns of tables along lines and at probes.
+/// Columns of tables along lines and at probes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TableColumns {
     /// None.

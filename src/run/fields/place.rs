@@ -1,4 +1,4 @@
-//! Where fields are asked for.
+//! Places of a solution that fields have values at.
 
 use std::cell::OnceCell;
 
@@ -25,7 +25,7 @@ impl Shared {
     }
 }
 
-/// What lies at a place.
+/// Node, element or point at a place.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::run) enum Spot {
     /// A node of elements, and its site if it is one.

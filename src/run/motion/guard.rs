@@ -46,7 +46,7 @@ impl Balance {
     }
 }
 
-/// Whether energies that do not balance stand side by side: of linear elements the thermal forces do work as loads do, of heated bonds and of local laws the temperature does.
+/// True of a scene whose energies do not add up to a balance: of linear elements the thermal forces do work as loads do, of heated bonds and of local laws the temperature does.
 pub(crate) fn energies_are_apart<const D: usize>(
     model: &Model<D>,
     rest: &RunSettings<D>,
