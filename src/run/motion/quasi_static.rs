@@ -385,12 +385,13 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         self.parts.look(&self.state.u, now, &mut self.seen.passed);
         self.find_damage_at_edge(seen);
         self.find_reason_to_end();
+        // before the files appear, which tell others that the run has begun
+        if begins {
+            self.options.begin_steps();
+        }
         if let Err(error) = self.write(seen, begins) {
             self.failed = Some(error);
             return ControlFlow::Break(());
-        }
-        if begins {
-            self.options.begin_steps();
         }
         let state = &self.state;
         self.progress.advance(u64::from(!begins));

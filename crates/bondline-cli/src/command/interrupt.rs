@@ -26,11 +26,13 @@ pub fn listen() -> miette::Result<&'static Interrupt> {
         heeded: AtomicBool::new(false),
     };
     ctrlc::set_handler(|| {
-        let again = INTERRUPT.asked.swap(true, Ordering::Relaxed);
+        let again = INTERRUPT.asked.load(Ordering::Relaxed);
         if again || !INTERRUPT.heeded.load(Ordering::Relaxed) {
             std::process::exit(i32::from(INTERRUPTED));
         }
         tell("ending with a checkpoint of the last step; once more ends at once, without a checkpoint");
+        // last: a run that sees it may be at its end before this thread goes on
+        INTERRUPT.asked.store(true, Ordering::Relaxed);
     })
     .map_err(|e| miette::miette!("cannot watch for Ctrl-C: {e}"))?;
     Ok(&INTERRUPT)
