@@ -57,7 +57,7 @@ impl Transfer {
         self.offsets.len() - 1
     }
 
-    /// Whether there is no place.
+    /// Returns true if there is no place.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -101,7 +101,7 @@ pub struct Row<const D: usize> {
     slot: Vec<u32>,
     columns: Vec<u32>,
     blocks: Vec<Tensor<D>>,
-    /// What [`Row::gather`] holds: blocks of places that are no sites.
+    /// Work space of [`Row::gather`]: blocks of places that are no sites.
     slot_of_place: Vec<u32>,
     places: Vec<u32>,
     place_blocks: Vec<Tensor<D>>,
@@ -241,7 +241,7 @@ impl<const D: usize> Row<D> {
         }
     }
 
-    /// Adds what waits for the places of this transfer.
+    /// Adds the blocks that wait for the places of this transfer.
     pub fn spread(&mut self, transfer: &Transfer) {
         let places = std::mem::take(&mut self.places);
         let blocks = std::mem::take(&mut self.place_blocks);
@@ -395,7 +395,7 @@ pub fn assemble_apart<const D: usize>(
     matrix
 }
 
-/// What remains of a block matrix whose values were dropped row by row.
+/// Pattern of a block matrix whose values were dropped row by row, with sums over them.
 #[derive(Clone, Debug, Default)]
 pub struct Pattern {
     /// Blocks of all rows, zero blocks included.
@@ -415,7 +415,7 @@ pub struct Pattern {
 /// Sums over the values of rows that are dropped.
 #[derive(Clone, Debug, Default)]
 struct Dropped {
-    /// What tells equal rows, and their numbers of blocks.
+    /// Hash of each row, by which equal rows are found, and its number of blocks.
     marks: Vec<(u64, usize)>,
     stored: usize,
     skew: f64,

@@ -46,7 +46,7 @@ fn halve(
     );
 }
 
-/// What `fill` adds to lists for parts of the numbers below `count`, in their order.
+/// Collects the items that `fill` adds to lists for parts of the numbers below `count`, in their order.
 fn gathered<T: Send>(
     count: usize,
     at_least: usize,
@@ -79,7 +79,7 @@ fn gathered<T: Send>(
 mod places {
     use super::for_parts;
 
-    /// Where values of the numbers below a count lie, each for the task that has its number.
+    /// Memory of the values of the numbers below a count, each for the task that has its number.
     struct Places<T>(*mut T);
 
     // SAFETY: each value is used by one thread at a time, as if it had been sent there
@@ -240,7 +240,7 @@ pub(crate) fn try_map<T: Send, E: Send>(
     }
 }
 
-/// What `of` finds for numbers below `count`, in their order.
+/// Collects the values that `of` finds for numbers below `count`, in their order.
 #[inline]
 pub(crate) fn filter_map<T: Send>(
     count: usize,
@@ -252,7 +252,7 @@ pub(crate) fn filter_map<T: Send>(
     })
 }
 
-/// What `add` adds to a list for the numbers below `count`, in their order.
+/// Collects the items that `add` adds to a list for the numbers below `count`, in their order.
 #[inline]
 pub(crate) fn listed<T: Send>(
     count: usize,
@@ -266,7 +266,7 @@ pub(crate) fn listed<T: Send>(
     })
 }
 
-/// What `of` finds for the first number below `count` for which it finds something.
+/// Returns the value that `of` finds for the first number below `count` for which it finds one.
 #[inline]
 pub(crate) fn find_first<T: Send>(
     count: usize,
@@ -291,7 +291,7 @@ pub(crate) fn find_first<T: Send>(
     found.map(|(_, value)| value)
 }
 
-/// Whether all numbers below `count` are as asked.
+/// Returns true if `is` holds for all numbers below `count`.
 #[inline]
 pub(crate) fn all(count: usize, at_least: usize, is: impl Fn(usize) -> bool + Sync) -> bool {
     let are = AtomicBool::new(true);

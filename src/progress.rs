@@ -1,7 +1,7 @@
-//! What a long computation tells the person who waits for it.
+//! Reports of a long computation to the person who waits for it.
 //!
 //! Assembly and solvers report to a [`Progress`]; they do not know whether anybody watches. The terminal bar lives in
-//! `observe`, so that nothing below it writes to a stream.
+//! the crate `bondline-terminal`, so that nothing below it writes to a stream.
 
 /// A listener to the stages of a computation.
 ///
@@ -14,12 +14,12 @@ pub trait Progress: Sync {
     /// Reports `by` further steps of the current stage; zero within a long step. A listener may end the computation here, by unwinding.
     fn advance(&self, by: u64);
 
-    /// Whether whoever listens wants the computation to end. Only what can end in order looks: load steps, from the last of which a run goes on.
+    /// Returns true if the listener wants the computation to end. Only what can end in order looks: load steps, from the last of which a run goes on.
     fn asks_to_end(&self) -> bool {
         false
     }
 
-    /// Says how the current stage stands, in a few words; for whoever watches.
+    /// Reports the state of the current stage in a few words, for the person who watches.
     fn tell(&self, _text: &str) {}
 
     /// A result on the way that stays to be read, also where nobody watches: hours of work should not be lost with their last line.

@@ -4,7 +4,7 @@
 
 use crate::tensor::Vector;
 
-/// How far from a barrier, as a fraction of the bond's length, a bond counts as touching it and no more.
+/// Distance to a barrier, as a fraction of the bond's length, within which a bond counts as touching it and no more.
 ///
 /// Coordinates of size 1 carry errors of 1e-16 and bonds are rarely shorter than 1e-4 of the model, so 1e-9 of a bond lies
 /// three orders above round-off and far below anything a mesh resolves.
@@ -44,15 +44,15 @@ pub enum Shape<const D: usize> {
     Union(Vec<Shape<D>>),
     /// The closure of the points of `from` that are not in `removed`.
     Without {
-        /// What remains.
+        /// Shape from which a part is removed.
         from: Box<Shape<D>>,
-        /// What is taken away.
+        /// Part that is removed.
         removed: Box<Shape<D>>,
     },
 }
 
 impl<const D: usize> Shape<D> {
-    /// Whether `x` lies in the shape or within `tolerance` \[length\] of it.
+    /// Returns true if `x` lies in the shape or within `tolerance` \[length\] of it.
     ///
     /// On the boundary of what [`Shape::Without`] removes, a point is still contained.
     pub fn contains(&self, x: &Vector<D>, tolerance: f64) -> bool {
@@ -155,7 +155,7 @@ impl<const D: usize> Shape<D> {
         }
     }
 
-    /// Whether a piece of positive length of the segment lies strictly inside the shape.
+    /// Returns true if a piece of positive length of the segment lies strictly inside the shape.
     fn swallows(&self, a: &Vector<D>, b: &Vector<D>) -> bool {
         let d = b - a;
         let length = d.norm();
@@ -196,7 +196,7 @@ impl<const D: usize> Shape<D> {
         }
     }
 
-    /// Whether `x` and its neighbours at a distance `skin` along and between all axes are contained.
+    /// Returns true if `x` and its neighbours at a distance `skin` along and between all axes are contained.
     ///
     /// Unlike a signed distance this sees that a face shared by two members of a union is no boundary.
     fn surrounds(&self, x: &Vector<D>, skin: f64) -> bool {
@@ -207,7 +207,7 @@ impl<const D: usize> Shape<D> {
         })
     }
 
-    /// Whether the segment passes from one side of the surface to the other.
+    /// Returns true if the segment passes from one side of the surface to the other.
     fn parts(&self, a: &Vector<D>, b: &Vector<D>) -> bool {
         match self {
             Self::Segment { a: p, b: q } => line_parts(p, q, a, b),
@@ -253,7 +253,7 @@ pub enum Barrier<const D: usize> {
 }
 
 impl<const D: usize> Barrier<D> {
-    /// Whether the barrier cuts the bond from `a` to `b`. The same answer for `b` to `a`.
+    /// Returns true if the barrier cuts the bond from `a` to `b`. The same answer for `b` to `a`.
     pub fn cuts(&self, a: &Vector<D>, b: &Vector<D>) -> bool {
         match self {
             Self::Void(shape) => shape.swallows(a, b),
@@ -268,7 +268,7 @@ impl<const D: usize> Barrier<D> {
         }
     }
 
-    /// Smallest and largest coordinates of what can cut.
+    /// Smallest and largest coordinates of the barrier.
     pub fn bounds(&self) -> (Vector<D>, Vector<D>) {
         self.shape().bounds()
     }
@@ -293,12 +293,12 @@ impl<const D: usize> Barriers<D> {
         Self { members }
     }
 
-    /// Whether there is no barrier at all.
+    /// Returns true if there is no barrier at all.
     pub fn is_empty(&self) -> bool {
         self.members.is_empty()
     }
 
-    /// Whether a bond of length `reach` or less that starts at `x` can meet a barrier; if not, its family needs no test.
+    /// Returns true if a bond of length `reach` or less that starts at `x` can meet a barrier; if not, its family needs no test.
     pub fn near(&self, x: &Vector<D>, reach: f64) -> bool {
         let reach = reach * (1.0 + TOUCH);
         self.members
@@ -306,7 +306,7 @@ impl<const D: usize> Barriers<D> {
             .any(|(lo, hi, _)| (0..D).all(|k| x[k] >= lo[k] - reach && x[k] <= hi[k] + reach))
     }
 
-    /// Whether any barrier cuts the bond from `a` to `b`.
+    /// Returns true if any barrier cuts the bond from `a` to `b`.
     pub fn cuts(&self, a: &Vector<D>, b: &Vector<D>) -> bool {
         self.members.iter().any(|(lo, hi, barrier)| {
             // a crack keeps points within a skin of it apart, hence the margin
@@ -399,14 +399,14 @@ fn polygon_distance<const D: usize>(points: &[Vector<D>], x: &Vector<D>) -> f64 
     }
 }
 
-/// Where the bond passes a plane, given the heights of its ends above it: `Some(t)` if they lie on different sides.
+/// Returns the position at which the bond crosses a plane, given the heights of its ends above it: `Some(t)` if they lie on different sides.
 fn plane_parts(height_a: f64, height_b: f64, length: f64) -> Option<f64> {
     let skin = TOUCH * length;
     let (above_a, above_b) = (height_a >= -skin, height_b >= -skin);
     (above_a != above_b).then(|| (height_a / (height_a - height_b)).clamp(0.0, 1.0))
 }
 
-/// Whether the line from `p` to `q` (a point in 1D) parts `a` from `b`.
+/// Returns true if the line from `p` to `q` (a point in 1D) separates `a` from `b`.
 fn line_parts<const D: usize>(p: &Vector<D>, q: &Vector<D>, a: &Vector<D>, b: &Vector<D>) -> bool {
     let length = (b - a).norm();
     match D {
@@ -430,7 +430,7 @@ fn line_parts<const D: usize>(p: &Vector<D>, q: &Vector<D>, a: &Vector<D>, b: &V
     }
 }
 
-/// Whether the plane polygon parts `a` from `b`.
+/// Returns true if the plane polygon separates `a` from `b`.
 fn polygon_parts<const D: usize>(points: &[Vector<D>], a: &Vector<D>, b: &Vector<D>) -> bool {
     let normal = polygon_normal(points);
     let area = normal.norm();

@@ -1,4 +1,4 @@
-//! The seam between models and solvers: what a solver may know of a (coupled) model.
+//! The seam between models and solvers: the interface of a (coupled) model to a solver.
 //!
 //! A solver sees sites with positions, a block-sparse stiffness `K` with `K u = f`, and whether `K` is symmetric.
 //! It never learns that coupling exists.
@@ -6,7 +6,7 @@
 //! | file | what |
 //! |---|---|
 //! | `shared_blocks.rs`, `spmv.rs`, `exact_sum.rs`, `segments.rs` | rows that share blocks; products, exact sums, ranges of sites |
-//! | `element_tangent.rs`, `springs.rs`, `neighbour_springs.rs` | what elements and springs add to the tangent |
+//! | `element_tangent.rs`, `springs.rs`, `neighbour_springs.rs` | parts of the tangent that elements and springs add |
 //! | `ranks.rs`, `partition.rs`, `ghosts.rs`, `shared_steps.rs` | several processes, and which sites each has |
 //! | `place_stress.rs`, `body_state.rs` | the stress of a place; damage, stresses and memory of a body |
 //! | `term.rs`, `with_terms.rs` | force terms beside a body, and their sum |
@@ -50,7 +50,7 @@ pub use springs::SpringRows;
 pub use term::{ForceTerm, RateBounds};
 pub use with_terms::WithTerms;
 
-/// Whether the tangent of a system is symmetric; solvers choose by it.
+/// Symmetry of the tangent of a system; solvers choose by it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Symmetry {
@@ -70,7 +70,7 @@ impl Symmetry {
     }
 }
 
-/// Whether a pass over the bonds may break them.
+/// Treatment of bonds beyond their critical stretch in a pass over the bonds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FailureUpdate {
     /// A bond beyond its critical stretch breaks, for good, and carries nothing from this pass on.
@@ -96,7 +96,7 @@ impl Interval {
     };
 }
 
-/// What breaking bonds has cost so far, and what laws with memory have dissipated.
+/// Cost of the bonds broken so far, and energy that laws with memory have dissipated.
 ///
 /// Units: \[J\] and \[m²\] (per thickness and \[m\] in 2D, per section and a number in 1D).
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -215,7 +215,7 @@ pub trait SemiDiscrete: Send + Sync {
     /// are linear, so that the tangent at rest is that at any displacement.
     fn difference_length(&self) -> Option<f64>;
 
-    /// What finite elements add to the tangent at rest at a displacement that ends an interval, in closed form; none if no element's law is nonlinear, or if the system does not know.
+    /// Returns the part of the tangent that finite elements add to that at rest at a displacement that ends an interval, in closed form; none if no element's law is nonlinear, or if the system does not know.
     fn element_tangent(&self, _u: &[f64], _interval: Interval) -> Option<ElementTangent> {
         None
     }
@@ -225,7 +225,7 @@ pub trait SemiDiscrete: Send + Sync {
         self.internal_force_into(u, force, interval, FailureUpdate::Frozen);
     }
 
-    /// Norm of the force \[N\] that rounding of places leaves at a displacement, beside what rounding of the displacement does; none but where forces depend on places (contact).
+    /// Norm of the force \[N\] that rounding of places leaves at a displacement, beside that of the rounding of the displacement; none but where forces depend on places (contact).
     fn round_off(&self, _u: &[f64]) -> f64 {
         0.0
     }
@@ -233,7 +233,7 @@ pub trait SemiDiscrete: Send + Sync {
     /// For every unknown an upper bound of `Σ_b |K_ab|`, with the tangent at rest.
     fn row_sums(&self) -> Vec<f64>;
 
-    /// Upper bound of what forces that rest does not show (contact) may add to the eigenvalues of `M⁻¹ K` \[1/s²\].
+    /// Upper bound of the part that forces absent from the state at rest (contact) may add to the eigenvalues of `M⁻¹ K` \[1/s²\].
     fn contact_frequency_bound(&self) -> f64 {
         0.0
     }
@@ -243,7 +243,7 @@ pub trait SemiDiscrete: Send + Sync {
         0.0
     }
 
-    /// Whether the tangent of each site, its row and its column, never changes; none does if the system does not know.
+    /// Returns true for each site whose tangent, its row and its column, never changes; false for all if the system does not know.
     fn tangent_is_constant(&self) -> Vec<bool> {
         vec![false; self.mass().len()]
     }
@@ -266,13 +266,13 @@ pub trait SemiDiscrete: Send + Sync {
     /// The state of the body, as results show it; none of a linear system in which nothing breaks.
     fn body_state(&self) -> Option<&dyn BodyState>;
 
-    /// Whether the tangent is symmetric, so that there is an energy to conserve.
+    /// Returns the symmetry of the tangent; if it is symmetric there is an energy to conserve.
     fn symmetry(&self) -> Symmetry;
 
     /// Energy stored in the bodies \[J\]; of a coupled system the sum of the bodies' own energies, which the motion conserves only as far as the seam does.
     fn stored_energy(&self, u: &[f64]) -> f64;
 
-    /// What breaking bonds has cost so far; none if nothing can break.
+    /// Returns the cost of the bonds broken so far; none if nothing can break.
     fn dissipation(&self) -> Option<Dissipation> {
         None
     }
@@ -280,8 +280,8 @@ pub trait SemiDiscrete: Send + Sync {
     /// Puts an earlier account of [`SemiDiscrete::dissipation`] in the place of this one: that of another layout of the same body.
     fn set_dissipation(&mut self, _dissipation: Dissipation) {}
 
-    /// Adds to the account what the bonds cost that the last call of [`SemiDiscrete::internal_force_into`] broke, with the energies of the displacement `at`.
-    /// Whoever lets bonds break calls this before anything else.
+    /// Adds to the account the cost of the bonds that the last call of [`SemiDiscrete::internal_force_into`] broke, with the energies of the displacement `at`.
+    /// A driver that lets bonds break calls this before anything else.
     fn account_for_breaks(&mut self, _at: &Halfway<'_>) {}
 
     /// All energy of [`SemiDiscrete::dissipation`] \[J\].
@@ -289,12 +289,12 @@ pub trait SemiDiscrete: Send + Sync {
         self.dissipation().map(|d| d.total())
     }
 
-    /// What breaking changes (one bit per bond, and what cannot be recomputed from it), for a checkpoint; empty without damage.
+    /// Returns the state of damage (one bit per bond, and what cannot be recomputed from it), for a checkpoint; empty without damage.
     fn damage_state(&self) -> Vec<u64> {
         Vec::new()
     }
 
-    /// Puts back what [`SemiDiscrete::damage_state`] gave; false if it belongs to another model.
+    /// Restores the state that [`SemiDiscrete::damage_state`] gave; false if it belongs to another model.
     fn restore_damage(&mut self, state: &[u64]) -> bool {
         state.is_empty()
     }
@@ -314,7 +314,7 @@ pub struct BlockCsr {
     pub columns: Vec<u32>,
     /// Dense blocks, row-major, one after another.
     pub values: Vec<f64>,
-    /// Which rows share their blocks; none if each row has its own.
+    /// Rows that share their blocks; none if each row has its own.
     pub shared: Option<SharedRows>,
 }
 
@@ -378,7 +378,7 @@ impl BlockCsr {
 
     /// `y = K x` of a matrix whose [rows add up to zero](Self::rows_add_up_to_zero), with differences of `x` within each row.
     ///
-    /// What `x` has in common along a row drops out of it before it is multiplied, so that the rounding does not grow with it. Rows that share their blocks with those before them are multiplied as by
+    /// The part of `x` that is common to a row drops out of it before it is multiplied, so that the rounding does not grow with it. Rows that share their blocks with those before them are multiplied as by
     /// [`BlockCsr::multiply_into`]. Threaded over rows; the same bits for any number of threads.
     pub fn multiply_differences_into(&self, x: &[f64], y: &mut [f64]) {
         spmv::multiply_differences_into(self, None, x, y);
@@ -394,7 +394,7 @@ impl BlockCsr {
         spmv::multiply_differences_into(self, marked, x, y);
     }
 
-    /// Whether every row gives nothing for an `x` that is the same at all sites, to 1e-12 of the sizes of its entries.
+    /// Returns true if every row gives nothing for an `x` that is the same at all sites, to 1e-12 of the sizes of its entries.
     pub fn rows_add_up_to_zero(&self) -> bool {
         let d = self.block;
         parallel::all(self.rows(), 1, |i| {

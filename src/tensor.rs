@@ -134,7 +134,7 @@ pub fn determinant<const D: usize>(t: &Tensor<D>) -> f64 {
     }
 }
 
-/// How near cos 3θ may come to ±1, where two principal values are near each other and the angle loses its digits.
+/// Distance of cos 3θ from ±1 within which two principal values are near each other and the angle loses its digits.
 const DISTINCT: f64 = 1e-4;
 
 /// The principal values of a symmetric tensor, in any order: by the angle of its deviator where they are distinct, else by an iteration that takes ten times as long.

@@ -11,10 +11,10 @@ mod petsc {
     use std::env::var;
     use std::process::Command;
 
-    /// Where PETSc is installed, and its configuration there, as PETSc's own makefiles have them.
+    /// Installation folder of PETSc, and its configuration there, as PETSc's own makefiles have them.
     const PLACE: [&str; 2] = ["PETSC_DIR", "PETSC_ARCH"];
 
-    /// What a command prints; an error that says what is missing ends the build.
+    /// Returns the output of a command; an error that says what is missing ends the build.
     fn printed(command: &mut Command, missing: &str) -> String {
         match command.output() {
             Ok(found) if found.status.success() => {

@@ -1,4 +1,4 @@
-//! What every cell tells of itself: the form that the file of each cell fills in.
+//! Description of a reference cell, which the file of each cell fills in.
 
 use crate::mesh::CellShape;
 
@@ -8,7 +8,7 @@ pub(super) const GAUSS: f64 = 0.577_350_269_189_625_8;
 /// `√(3/5)`, the outer abscissa of the three-point Gauss rule.
 pub(super) const GAUSS_3: f64 = 0.774_596_669_241_483_4;
 
-/// The most nodes that a cell has: what arrays with an entry per node have room for.
+/// Largest number of nodes of a cell: the size of arrays with an entry per node.
 ///
 /// Loops run over the nodes of the cell at hand, so that small cells pay for no more than zeros.
 pub const MAX_NODES: usize = 20;
@@ -19,7 +19,7 @@ pub type PerNode<T> = [T; MAX_NODES];
 /// One point of a quadrature rule: reference coordinates (unused ones are zero) and weight.
 pub type RulePoint = ([f64; 3], f64);
 
-/// Which quadrature rule of a cell.
+/// Quadrature rule of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
     /// Full integration of a stiffness: exact for an affine cell of constant material.
@@ -41,7 +41,7 @@ pub struct ReferenceCell {
     pub values: fn(&[f64; 3]) -> PerNode<f64>,
     /// Their gradients `∂N_a/∂ξ_j`.
     pub gradients: fn(&[f64; 3]) -> PerNode<[f64; 3]>,
-    /// How far ξ lies outside of the reference domain, in units of its extent; negative inside.
+    /// Distance of ξ from the reference domain, in units of its extent; negative inside.
     pub outside: fn(&[f64; 3]) -> f64,
     /// The rule of [`Rule::Stiffness`].
     pub stiffness: &'static [RulePoint],

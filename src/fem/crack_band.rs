@@ -13,7 +13,7 @@ use crate::{
     mesh::Mesh,
 };
 
-/// Why a cell cannot have a law that softens.
+/// Error of a cell that cannot have a law that softens.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum CellBandError {
     /// It would snap back.
@@ -21,7 +21,7 @@ pub enum CellBandError {
     Wide {
         /// The cell.
         cell: usize,
-        /// Why.
+        /// The reason.
         #[source]
         source: WideBand,
     },
@@ -65,7 +65,7 @@ pub fn crack_band<const D: usize>(mesh: &Mesh<D>, cell: usize) -> f64 {
 /// Local laws of cells: one of a material, or of a material and a width.
 #[derive(Debug)]
 pub(super) struct CellLaws<const D: usize> {
-    /// What was asked for, by its place in memory.
+    /// Laws of the materials, by their place in memory.
     typed: Vec<Arc<dyn LocalLaw<D>>>,
     /// The laws of the cells.
     pub laws: Vec<Arc<dyn LocalLaw<D>>>,

@@ -43,7 +43,7 @@ pub fn reference_of<const D: usize>(mesh: &Mesh<D>, c: usize, x: &Vector<D>) -> 
     None
 }
 
-/// Where a point lies: a cell and the weights of its nodes.
+/// Location of a point: a cell and the weights of its nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Located<const D: usize> {
     /// Cell number in the mesh.
@@ -148,7 +148,7 @@ impl<const D: usize> Locator<D> {
         best
     }
 
-    /// Whether a cell holds `x`, as [`Locator::locate`] has it: no more than a look at the cell's box where `x` lies inside of a line, a rectangle or a cuboid along the axes.
+    /// Returns true if a cell holds `x`, as [`Locator::locate`] has it: no more than a look at the cell's box where `x` lies inside of a line, a rectangle or a cuboid along the axes.
     pub fn holds(&self, mesh: &Mesh<D>, x: &Vector<D>, tolerance: f64) -> bool {
         let mut is_held = false;
         self.around(x, tolerance, |cells| {
@@ -232,7 +232,7 @@ fn bounding_box<const D: usize>(mesh: &Mesh<D>, c: usize) -> (Vector<D>, Vector<
     (low, high)
 }
 
-/// Whether a cell fills its bounding box: as many nodes as the box has corners, and each at one.
+/// Returns true if a cell fills its bounding box: as many nodes as the box has corners, and each at one.
 fn is_box<const D: usize>(mesh: &Mesh<D>, c: usize, low: &Vector<D>, high: &Vector<D>) -> bool {
     let nodes = mesh.cell(c);
     let at_corner = |x: &Vector<D>| (0..D).all(|i| x[i] == low[i] || x[i] == high[i]);

@@ -1,4 +1,4 @@
-//! What of a cell's volume and mass each of its nodes has, and of a body force on the cell beside lumped masses.
+//! Lumping: share of each node in a cell's volume and mass, and in a body force on the cell beside lumped masses.
 
 use super::cell::{MAX_NODES, Rule};
 use super::element::for_each_point;

@@ -34,13 +34,13 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `cell.rs` | what a cell tells of itself |
+//! | `cell.rs` | description of a reference cell |
 //! | `line2.rs`, `tri3.rs`, `quad4.rs`, `tet4.rs`, `hex8.rs` | one linear cell each |
 //! | `line3.rs`, `tri6.rs`, `quad8.rs`, `tet10.rs`, `hex20.rs` | one cell of second order each |
 //! | `element.rs` | quadrature points in space, block rows of an element's stiffness, fields at a point |
 //! | `superconvergent.rs` | the displacement gradient anywhere in a cell, from where it is most accurate |
 //! | `crack_band.rs` | the width in which a law that softens localises in a cell |
-//! | `nonlinear.rs`, `nonlinear/` | elements of a law that is not linear: what they add to the linear ones, what their points remember |
+//! | `nonlinear.rs`, `nonlinear/` | elements of a law that is not linear: their excess over the linear ones, and their history variables |
 //! | `load.rs` | consistent nodal forces of tractions and body forces |
 //! | `locate.rs` | from a point in space to a cell and its shape functions |
 //! | `lumping.rs` | lumped volumes and masses, body forces beside these |

@@ -1,10 +1,10 @@
-//! Finite elements whose stress is not linear in the displacement gradient, as what they add to the elements of the tangent at rest.
+//! Finite elements whose stress is not linear in the displacement gradient, as their excess over the elements of the tangent at rest.
 //!
 //! ```text
 //!   f_a = Σ_b K_ab u_b + ∫ (P(∇u, history) − C : ∇u) · ∂N_a/∂X dV
 //! ```
 //!
-//! Where a law flows at constant volume, cells of first order with several quadrature points take the mean of their dilatation, `∇u + (θ̄ − θ)/D I`, in stress and virtual work alike (the B̄ method, \[Hughes1987\] section 4.5):
+//! For a law that flows at constant volume, cells of first order with several quadrature points take the mean of their dilatation, `∇u + (θ̄ − θ)/D I`, in stress and virtual work alike (the B̄ method, \[Hughes1987\] section 4.5):
 //! with the dilatation of each point they would resist the flow. Under affine fields the two are the same.
 //! Cells of second order keep the dilatation of each point: with its mean they would not resist `u = 2 (a·x) x − |x|² a` at all, whose strain is a dilatation alone.
 //!
@@ -38,7 +38,7 @@ struct Element {
     node: usize,
     /// Numbers of history of each of its quadrature points.
     each: usize,
-    /// Whether its energy is part of the body's: an element that only overlaps has none.
+    /// True if its energy is part of the body's: an element that only overlaps has none.
     counts: bool,
 }
 
@@ -73,19 +73,19 @@ impl<const D: usize> Excess<D> {
     }
 }
 
-/// Elements of laws that are not linear, with what their quadrature points remember.
+/// Elements of laws that are not linear, with the history variables of their quadrature points.
 #[derive(Clone, Debug)]
 pub struct NonlinearElements<const D: usize> {
     laws: Vec<Arc<dyn LocalLaw<D>>>,
     /// By ascending cell.
     elements: Vec<Element>,
-    /// What was committed last, and what the last force found.
+    /// History variables: those committed last, and those of the last response.
     past: Vec<f64>,
     present: Vec<f64>,
     excess: Vec<Excess<D>>,
-    /// Of each node of each element \[N\], of the last response.
+    /// Force of each node of each element \[N\], of the last response.
     forces: Vec<Vector<D>>,
-    /// By how much each node of each element is displaced where it expands freely \[m\]; empty where nothing expands.
+    /// Displacement of each node of each element where it expands freely \[m\]; empty where nothing expands.
     expanded: Vec<Vector<D>>,
     /// For each node of the mesh where its elements begin in `of_node`.
     offsets: Vec<u32>,
@@ -156,12 +156,12 @@ impl<const D: usize> NonlinearElements<D> {
         }))
     }
 
-    /// Whether points remember anything.
+    /// Returns true if quadrature points have history variables.
     pub fn remembers(&self) -> bool {
         !self.past.is_empty()
     }
 
-    /// Whether any of them lies around a node.
+    /// Returns true if any of the elements has the node.
     pub fn is_around(&self, node: u32) -> bool {
         self.offsets[node as usize] < self.offsets[node as usize + 1]
     }
@@ -202,7 +202,7 @@ impl<const D: usize> NonlinearElements<D> {
         each_element(&self.elements, own, &of_element);
     }
 
-    /// What the elements around a node add to its force \[N\], of the last response.
+    /// Returns the force of the elements around a node beyond that of the linear ones \[N\], of the last response.
     pub fn force(&self, node: u32) -> Vector<D> {
         let n = node as usize;
         let around = &self.of_node[self.offsets[n] as usize..self.offsets[n + 1] as usize];
@@ -210,7 +210,7 @@ impl<const D: usize> NonlinearElements<D> {
         forces.map(|&place| self.forces[place as usize]).sum()
     }
 
-    /// The end of an interval: what the last response found is remembered from now on. Returns the energy dissipated \[J\].
+    /// Ends an interval: the history of the last response is committed. Returns the energy dissipated \[J\].
     pub fn commit(&mut self) -> f64 {
         self.past.clone_from(&self.present);
         let own = self.elements.iter().zip(&self.excess);
@@ -219,7 +219,7 @@ impl<const D: usize> NonlinearElements<D> {
             .sum()
     }
 
-    /// What is stored beyond the energy of the linear elements \[J\], at a displacement of the nodes \[m\] and with what was committed last.
+    /// Returns the stored energy beyond that of the linear elements \[J\], at a displacement of the nodes \[m\] and with the history committed last.
     pub fn stored(&self, mesh: &Mesh<D>, displacement: impl Fn(u32) -> Vector<D> + Sync) -> f64 {
         let counted = parallel::filter_map(self.elements.len(), 1, |e| {
             let element = &self.elements[e];
@@ -252,7 +252,7 @@ impl<const D: usize> NonlinearElements<D> {
         Some(found.energy / found.volume)
     }
 
-    /// What an element has beyond the linear one, with what was committed last.
+    /// Returns the excess of an element over the linear one, with the history committed last.
     fn of_element(
         &self,
         mesh: &Mesh<D>,
@@ -272,7 +272,7 @@ impl<const D: usize> NonlinearElements<D> {
         excess(mesh, element, law, displacement, 0.0, known, into)
     }
 
-    /// What was remembered of each cell, by name: means over its volume, the names in the order of the laws.
+    /// Returns the history variables of each cell, by name: means over its volume, the names in the order of the laws.
     pub fn remembered(&self, mesh: &Mesh<D>) -> Vec<(&'static str, Vec<(u32, f64)>)> {
         let mut found: Vec<(&'static str, Vec<(u32, f64)>)> = Vec::new();
         for element in &self.elements {
@@ -378,7 +378,7 @@ fn each_element<const D: usize>(
     }
 }
 
-/// Excess of an element over the linear one, which expands by the same displacements of its nodes; overwrites what its points remember at present, and its nodal forces \[N\].
+/// Excess of an element over the linear one, which expands by the same displacements of its nodes; overwrites the present history variables of its points, and its nodal forces \[N\].
 fn excess<const D: usize>(
     mesh: &Mesh<D>,
     element: &Element,

@@ -33,7 +33,7 @@ pub fn superconvergent_gradient<const D: usize>(
     points.iter().map(gradient).sum()
 }
 
-/// Where \[m\] the value of [`superconvergent_gradient`] at the reference coordinates `xi` of cell `c` belongs to: their own place, in linear cells the centroid.
+/// Position \[m\] to which the value of [`superconvergent_gradient`] at the reference coordinates `xi` of cell `c` belongs: that of `xi` itself, in linear cells the centroid.
 pub fn position_in<const D: usize>(mesh: &Mesh<D>, c: usize, xi: &[f64; 3]) -> Vector<D> {
     let shape = mesh.shapes[c];
     match reference_cell(shape).filter(|_| shape.is_quadratic()) {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{LocalHistory, LocalLaw, LocalResponse, WideBand, reduction::with_unnamed};
 use crate::tensor::{Tensor, Tensor4};
 
-/// Numbers that a point remembers beside those of its law: the free stretch s that it is given, `1 + s` at the end of the last step (0 before the first), `∂W/∂s` there, and the work of heating.
+/// History variables of a point beside those of its law: the free stretch s that it is given, `1 + s` at the end of the last step (0 before the first), `∂W/∂s` there, and the work of heating.
 const OWN: usize = 4;
 
 /// A law of solids whose stress is that of what is left of the deformation beyond a free stretch `s = α ΔT`.
@@ -13,7 +13,7 @@ const OWN: usize = 4;
 /// Strains of any size: `F_m = F/(1 + s)`, and W is an energy of the expanded body, `W = (1 + s)³ W_m(F_m)`, so that the Cauchy stress is the one of the law at `F_m` and `P = (1 + s)² P_m` (\[BoleyWeiner1960\] for small strains).
 /// Small strains: `σ = σ_m(ε − s I)`. At a deformation that is held, the energy changes with the temperature by `∂W/∂s = 3 (1 + s)² W_m − (1 + s) P_m : F`, for small strains `−tr σ`; the work of heating is its sum by the trapezoidal rule.
 ///
-/// Whoever knows the temperature writes s to the number [`LocalHistory::free_stretch`] of what a point remembers. Within [`Reduced`](super::Reduced) the strain out of the body expands too.
+/// The owner of the temperature writes s to the number [`LocalHistory::free_stretch`] of the history of a point. Within [`Reduced`](super::Reduced) the strain out of the body expands too.
 #[derive(Clone, Debug)]
 pub struct Expanding {
     law: Arc<dyn LocalLaw<3>>,
@@ -124,7 +124,7 @@ impl LocalLaw<3> for Expanding {
     }
 }
 
-/// The work of heating per volume that a point remembers \[J/m^D\], of a law with [`LocalHistory::free_stretch`] at `place`.
+/// The work of heating per volume in the history of a point \[J/m^D\], of a law with [`LocalHistory::free_stretch`] at `place`.
 pub fn heat_work(point: &[f64], place: usize) -> f64 {
     point[place + 3]
 }

@@ -7,7 +7,7 @@ use crate::tensor::{Tensor, Tensor4, strain};
 /// Components of a strain that are remembered: xx, xy, xz, yy, yz, zz.
 const COMPONENTS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
-/// The names of all that a point remembers, the strain first, then that of the springs, arm by arm.
+/// The names of the history variables of a point, the strain first, then that of the springs, arm by arm.
 macro_rules! of_arms {
     ($($arm:literal)*) => {
         const HISTORY: [&str; COMPONENTS.len() * (1 + PronySeries::ARMS)] = [

@@ -1,4 +1,4 @@
-//! How the yield stress of a ductile material grows with the equivalent plastic strain, and with its rate.
+//! Growth of the yield stress of a ductile material with the equivalent plastic strain, and with its rate.
 
 /// Most steps of the search for the plastic flow.
 const ITERATIONS: usize = 200;

@@ -60,7 +60,7 @@ struct Trial<const D: usize> {
     deviator: Tensor<D>,
     norm: f64,
     equivalent: f64,
-    /// What a unit of α takes from the equivalent stress.
+    /// Decrease of the equivalent stress per unit of α.
     stiffness: f64,
 }
 

@@ -6,7 +6,7 @@ use crate::tensor::{Tensor, Tensor4, Vector, inverse, strain};
 /// J2 plasticity in logarithmic strains: `F = F_e F_p`, `ε_e = ½ ln b_e`, `b_e = F_e F_eᵀ = F C_p⁻¹ Fᵀ`, and [`J2`] between the elastic strain `ε_e` and the Kirchhoff stress `τ = C : ε_e`.
 ///
 /// With the exponential map the return of small strains holds in the principal directions of the trial state (\[Simo1992\]; \[SimoHughes1998\] section 9.4), so that plastic flow keeps the volume. The elastic response is
-/// that of Hencky: `ψ = ½ ε_e : C : ε_e`, `P = τ F⁻ᵀ`. It remembers `C_p⁻¹ − I` and the equivalent plastic strain.
+/// that of Hencky: `ψ = ½ ε_e : C : ε_e`, `P = τ F⁻ᵀ`. Its history variables are `C_p⁻¹ − I` and the equivalent plastic strain.
 #[derive(Clone, Debug)]
 pub struct LogarithmicJ2 {
     law: J2<3>,

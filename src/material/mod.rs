@@ -7,14 +7,14 @@
 //! | `hardening.rs` | its yield stress: linear, Voce, Johnson–Cook |
 //! | `hyperelastic.rs` | St Venant–Kirchhoff and Neo-Hooke, for strains of any size |
 //! | `logarithmic_j2.rs` | the same for strains of any size |
-//! | `scalar_damage.rs`, `softening.rs` | isotropic scalar damage with a tensile strength and a fracture energy, and how it softens |
+//! | `scalar_damage.rs`, `softening.rs` | isotropic scalar damage with a tensile strength and a fracture energy, and its softening |
 //! | `generalised_maxwell.rs`, `prony.rs` | linear viscoelasticity: a Prony series of the shear modulus, for small strains |
 //! | `expanding.rs` | any law of solids that expands with its temperature |
 //! | `reduction.rs` | any law of solids in bars, plates and long bodies |
 //! | `algorithmic_tangent.rs` | differences of any law, for its algorithmic tangent |
-//! | `user_routine.rs` | what a scene asks of a user's compiled routine; crate `bondline-umat` loads it and makes a law of it |
+//! | `user_routine.rs` | settings of a scene for a user's compiled routine; crate `bondline-umat` loads it and makes a law of it |
 //!
-//! A law takes the gradient `G_ij = ∂u_i/∂x_j` \[1\] at the end of a step and what it remembers, and gives the first Piola–Kirchhoff stress `P` \[Pa\] (for small strains there is but one stress),
+//! A law takes the gradient `G_ij = ∂u_i/∂x_j` \[1\] at the end of a step and the history variables, and gives the first Piola–Kirchhoff stress `P` \[Pa\] (for small strains there is but one stress),
 //! the energies stored and dissipated \[J/m^D\], and the tangent of the undeformed body `C = ∂P/∂G` \[Pa\]. It serves the points of a correspondence material and the quadrature points of finite elements.
 //! A new law is one file and one line in the table of the conformance tests, which check for every law that these belong together, that nothing is stressed at rest, and that a rotation
 //! (linearised, where the law is for small strains) stresses nothing.
@@ -60,7 +60,7 @@ use std::sync::Arc;
 
 use crate::tensor::{Tensor, Tensor4, principal_values};
 
-/// How a body of `D` dimensions stands for a solid of three.
+/// Kinematics by which a body of `D` dimensions stands for a solid of three.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kinematics {
@@ -107,7 +107,7 @@ pub enum MaterialError {
         "Young's modulus is {value}, but must be positive and finite; give it in the scene's unit of stress, such as 72e9 for 72 GPa"
     )]
     YoungsModulus {
-        /// What was given \[Pa\].
+        /// The value given \[Pa\].
         value: f64,
     },
     /// Poisson's ratio is outside of (-1, 0.5).
@@ -120,7 +120,7 @@ pub enum MaterialError {
         }
     )]
     PoissonRatio {
-        /// What was given.
+        /// The value given.
         value: f64,
     },
     /// The density is negative or not finite.
@@ -128,7 +128,7 @@ pub enum MaterialError {
         "the density is {value}, but must be zero or positive and finite; a static run does not use it and accepts 0"
     )]
     Density {
-        /// What was given [kg/m³].
+        /// The value given [kg/m³].
         value: f64,
     },
     /// The kinematics belong to another dimension.
@@ -139,7 +139,7 @@ pub enum MaterialError {
         match dimension { 1 => "bar", 2 => "plane-stress or plane-strain", _ => "solid" }
     )]
     Kinematics {
-        /// What was given.
+        /// The kinematics given.
         kinematics: Kinematics,
         /// Dimension of the mesh.
         dimension: usize,
@@ -162,7 +162,7 @@ pub struct WideBand {
     pub energy: f64,
 }
 
-/// What a local law answers.
+/// Response of a local law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalResponse<const D: usize> {
     /// First Piola–Kirchhoff stress at the end of the step \[Pa\], force per undeformed area; symmetric where the law is for small strains.
@@ -205,9 +205,9 @@ impl<const D: usize> LocalResponse<D> {
 pub struct LocalHistory {
     /// The names of the numbers. Those without a name are not shown.
     pub names: &'static [&'static str],
-    /// Which of them is the damage D, by which the law loses its stiffness; none of a law that does not.
+    /// Index of the damage D among the numbers, by which the law loses its stiffness; none of a law without damage.
     pub damage: Option<usize>,
-    /// Which of them is the free stretch `α ΔT`, for the owner of a temperature to write before each response; none of a law that does not expand by itself.
+    /// Index of the free stretch `α ΔT` among the numbers, for the owner of a temperature to write before each response; none of a law that does not expand by itself.
     pub free_stretch: Option<usize>,
     /// True of a law whose response depends on how the deformation came about.
     pub is_path_dependent: bool,
@@ -217,7 +217,7 @@ impl LocalHistory {
     /// A law without memory.
     pub const NONE: Self = Self::of(&[]);
 
-    /// A law that remembers its path by these numbers, none of them a damage.
+    /// A law with these history variables, none of them a damage.
     pub const fn of(names: &'static [&'static str]) -> Self {
         Self {
             names,
@@ -250,21 +250,21 @@ pub fn differenced_tangent<const D: usize>(
     })
 }
 
-/// A local law: stress and energies of a displacement gradient, and of what it remembers.
+/// A local law: stress and energies of a displacement gradient, and of the history.
 pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
     /// `C_ijkl = ∂P_ij/∂G_kl` of the undeformed body \[Pa\].
     fn tangent(&self) -> &Tensor4<D>;
 
-    /// Whether the stress is `C : G`, whatever came before.
+    /// Returns true if the stress is `C : G`, whatever came before.
     fn is_linear(&self) -> bool;
 
-    /// Whether it holds for strains of any size: a rotation of the deformed body rotates its stress, `P(Q F) = Q P(F)`.
+    /// Returns true if it holds for strains of any size: a rotation of the deformed body rotates its stress, `P(Q F) = Q P(F)`.
     fn is_objective(&self) -> bool;
 
-    /// Its memory of a point.
+    /// The history variables of a point.
     fn history(&self) -> LocalHistory;
 
-    /// Whether it flows without a change of volume, so that cells with a dilatation at each quadrature point would resist it.
+    /// Returns true if it flows without a change of volume, so that cells with a dilatation at each quadrature point would resist it.
     fn flows_at_constant_volume(&self) -> bool;
 
     /// The response at the end of a step of the length `step` \[s\]; `gradient` is `G_ij = ∂u_i/∂x_j`. Overwrites `present` with what is remembered then; `past` is what was at its beginning.
@@ -287,12 +287,12 @@ pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
         differenced_tangent(self, gradient, step, past)
     }
 
-    /// Whether `C_ijkl = C_klij` holds for [`LocalLaw::algorithmic_tangent`], so that solvers may take a stiffness made of it for a symmetric one.
+    /// Returns true if `C_ijkl = C_klij` holds for [`LocalLaw::algorithmic_tangent`], so that solvers may take a stiffness made of it for a symmetric one.
     fn has_symmetric_tangent(&self) -> bool {
         false
     }
 
-    /// What failed last within the law, with its remedy; none of a law that computes what it is given. What fails has a response that is not a number.
+    /// Returns the last failure within the law, with its remedy; none of a law that computes what it is given. A response that failed is not a number.
     fn failure(&self) -> Option<String> {
         None
     }

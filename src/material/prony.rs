@@ -29,7 +29,7 @@ impl PronySeries {
         Self { arms, lasting }
     }
 
-    /// How many numbers a strain is remembered by: itself, and that of the spring in each arm.
+    /// Returns the number of values by which a strain is remembered: itself, and that of the spring in each arm.
     pub fn remembered(&self) -> usize {
         1 + self.arms.len()
     }
@@ -61,7 +61,7 @@ pub struct PronyStep {
     lasting: f64,
 }
 
-/// What a series carries of a strain at the end of a step, by a unit modulus.
+/// Response of a series to a strain at the end of a step, for a unit modulus.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Carried {
     /// `(1 − Σ λ_i) e + Σ λ_i q_i`.
@@ -73,7 +73,7 @@ pub struct Carried {
 }
 
 impl PronyStep {
-    /// Follows a strain to `e` at the end of the step. `past` gives what was remembered at its beginning, the strain at 0 and that of the spring in arm i at i; `keep` is told the same of its end.
+    /// Follows a strain to `e` at the end of the step. `past` gives what was remembered at its beginning, the strain at 0 and that of the spring in arm i at i; `keep` receives the same at its end.
     pub fn follow(
         &self,
         e: f64,

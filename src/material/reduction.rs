@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::{Kinematics, LocalHistory, LocalLaw, LocalResponse, WideBand};
 use crate::tensor::{Tensor, Tensor4};
 
-/// Numbers that a law remembers of a point, up to which they take no memory of their own.
+/// Number of history variables of a point up to which they take no memory of their own.
 const FEW: usize = 32;
 
 /// Most corrections of the strain out of the body.
@@ -20,14 +20,14 @@ const ITERATIONS: usize = 60;
 #[derive(Clone, Debug)]
 pub struct Reduced<const D: usize> {
     law: Arc<dyn LocalLaw<3>>,
-    /// What the law remembers, then the numbers of [`OWN`] where it remembers any and a strain is free.
+    /// History of the law, then the numbers of [`OWN`] where it has any and a strain is free.
     history: LocalHistory,
     /// The first direction whose strain follows from the stress being zero; 3 if there is none.
     free: usize,
     tangent: Tensor4<D>,
 }
 
-/// Numbers that are remembered beside the history of the solid, and not shown: the strain out of the body, and the largest gradient so far, which sets the scale of round-off.
+/// Number of history variables beside those of the solid, which are not shown: the strain out of the body, and the largest gradient so far, which sets the scale of round-off.
 const OWN: usize = 2;
 
 /// The names of a history, and so many numbers that are not shown.
@@ -84,7 +84,7 @@ impl<const D: usize> Reduced<D> {
         self.law.respond(&whole, step, past, present)
     }
 
-    /// What the solid remembers.
+    /// Returns the history of the solid.
     fn of_solid<'a>(&self, history: &'a [f64]) -> &'a [f64] {
         &history[..self.law.history().len()]
     }

@@ -17,7 +17,7 @@ pub enum EquivalentStrain {
     Energy,
 }
 
-/// How the stress falls with the strain in uniaxial tension beyond the strength.
+/// Decrease of the stress with the strain in uniaxial tension beyond the strength.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SofteningCurve {
     /// `σ = f_t exp(−(ε − ε₀)/ε_f)`.
@@ -26,7 +26,7 @@ pub enum SofteningCurve {
     Linear,
 }
 
-/// What a scalar damage material is.
+/// Parameters of a scalar damage material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScalarDamageSettings {
     /// Lamé's λ of the solid \[Pa\].
@@ -39,7 +39,7 @@ pub struct ScalarDamageSettings {
     pub energy: f64,
     /// ε̃.
     pub measure: EquivalentStrain,
-    /// How it softens.
+    /// Its softening curve.
     pub curve: SofteningCurve,
 }
 
@@ -64,7 +64,7 @@ impl ScalarDamageSettings {
 /// Source: \[LemaitreChaboche1990\] for `W` and Z, \[Mazars1986\] for ε̃, and \[BazantOh1983\] for the crack band. `E g` is the curve of uniaxial tension ([`Envelope`]): its peak is the tensile strength, and the area under it is `G_f/h`,
 /// where h is the width of the band in which the deformation localises: until [`LocalLaw::in_band`] gives it, the law is linearly elastic. `r` is [`RESIDUAL`].
 ///
-/// What a step dissipates is `∫ ψ₀ dD` with ψ₀ linear in ε̃² from the beginning of the step to its end: exact for strains that keep their direction, and for [`EquivalentStrain::Energy`].
+/// The dissipation of a step is `∫ ψ₀ dD` with ψ₀ linear in ε̃² from the beginning of the step to its end: exact for strains that keep their direction, and for [`EquivalentStrain::Energy`].
 #[derive(Clone, Debug)]
 pub struct ScalarDamage {
     elastic: Tensor4<3>,
@@ -73,7 +73,7 @@ pub struct ScalarDamage {
     envelope: Option<Envelope>,
 }
 
-/// What a point remembers.
+/// History variables of a point.
 const HISTORY: [&str; 4] = [
     "scalar damage",
     "largest equivalent strain",

@@ -1,4 +1,4 @@
-//! Softening: what is left of a linear response beyond its onset.
+//! Softening: decrease of a linear response beyond its onset.
 
 /// A response that is linear up to `onset` and softens beyond it, over its stiffness: `g(s) = s` up to `s₀`, then falling to zero at `end`, of a strain of a material or a stretch of a bond.
 ///
@@ -8,7 +8,7 @@
 pub struct Envelope {
     /// s₀, at which softening begins.
     pub onset: f64,
-    /// Where nothing is left; infinite if something always is.
+    /// Strain or stretch from which on nothing is left; infinite if something always is.
     pub end: f64,
     /// s_f of an exponential.
     decay: Option<f64>,
@@ -60,7 +60,7 @@ impl Envelope {
         }
     }
 
-    /// What has been dissipated by then, over the stiffness: `∫ g ds` less what is stored.
+    /// Returns the energy dissipated up to `s`, over the stiffness: `∫ g ds` less what is stored.
     pub fn spent(&self, s: f64) -> f64 {
         if s <= self.onset {
             return 0.0;

@@ -1,11 +1,11 @@
-//! What a scene asks of a user's routine, and who loads it: crate `bondline-umat`, where a program has it. Without it no scene opens a library.
+//! Settings by which a scene calls a user's routine, and the hook of its loader: crate `bondline-umat`, where a program has it. Without it no scene opens a library.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use super::LocalLaw;
 
-/// What a routine's energies are taken from.
+/// Source of the energies of a routine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UmatEnergies {
     /// Stored is the elastic energy of the stress, `½ σ : C⁻¹ : σ`; what else was worked is dissipated.
@@ -14,7 +14,7 @@ pub enum UmatEnergies {
     Routine,
 }
 
-/// How a routine is called.
+/// Settings of the calls of a routine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UmatSettings {
     /// `CMNAME`: the name of the material.
@@ -27,21 +27,21 @@ pub struct UmatSettings {
     pub lame: (f64, f64),
     /// For strains and rotations of any size, by a rate form.
     pub is_large: bool,
-    /// Whether routines keep no common state, so that many may be called at a time.
+    /// True if routines keep no common state, so that many may be called at a time.
     pub is_thread_safe: bool,
     /// `TEMP`.
     pub temperature: f64,
     /// `CELENT` \[m\]; not a number where it is not known.
     pub length: f64,
-    /// What energies are taken from.
+    /// Source of the energies.
     pub energies: UmatEnergies,
-    /// Whether `DDSDDE` is the tangent of Newton's method; else it is differenced.
+    /// True if `DDSDDE` is the tangent of Newton's method; else it is differenced.
     pub has_tangent: bool,
     /// See [`LocalLaw::flows_at_constant_volume`].
     pub flows_at_constant_volume: bool,
 }
 
-/// Why a routine cannot be had.
+/// Failure to load a routine.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RoutineError {
     /// The library cannot be loaded.
@@ -49,7 +49,7 @@ pub enum RoutineError {
     Library {
         /// Its path.
         path: PathBuf,
-        /// What the system says.
+        /// Message of the operating system.
         message: String,
     },
     /// It has no such routine.
@@ -68,12 +68,12 @@ pub type RoutineLoader =
 
 static LOADER: OnceLock<RoutineLoader> = OnceLock::new();
 
-/// Takes what loads routines; the first one stays.
+/// Registers the loader of routines; the first one stays.
 pub fn set_routine_loader(loader: RoutineLoader) {
     let _ = LOADER.set(loader);
 }
 
-/// What loads routines, if the program has it.
+/// Returns the loader of routines, if the program has one.
 pub(crate) fn routine_loader() -> Option<RoutineLoader> {
     LOADER.get().copied()
 }

@@ -18,7 +18,7 @@ pub struct BoundaryFacet {
 }
 
 impl BoundaryFacet {
-    /// What all cells that share it have in common: its corners.
+    /// Key of the facet, the same in all cells that share it: its corners.
     pub(super) fn key<const D: usize>(&self) -> [u32; 4] {
         key(facet_corners::<D>(&self.nodes).iter().copied())
     }

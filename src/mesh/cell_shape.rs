@@ -1,4 +1,4 @@
-//! The shapes of cells: what the mesh, its readers and the writer of files know of each, one entry of a table.
+//! The shapes of cells: data of each for the mesh, its readers and the writer of files, one entry of a table.
 //!
 //! A new shape is a variant of [`CellShape`], its [`Geometry`] and a line in [`GEOMETRY`]. In every shape corners come first, in the order of the linear shape, so
 //! that a cell of second order without its other nodes is a linear cell.
@@ -32,7 +32,7 @@ pub enum CellShape {
     Hex20,
 }
 
-/// What is known of a shape.
+/// Description of a shape.
 #[derive(Clone, Copy)]
 struct Geometry {
     shape: CellShape,
@@ -48,7 +48,7 @@ struct Geometry {
     facets: &'static [&'static [usize]],
     /// The ends of the edge of each node after the corners.
     mid_sides: &'static [[usize; 2]],
-    /// Where Gmsh has the nodes after the corners; empty where it has VTK's order.
+    /// Positions of the nodes after the corners in Gmsh's order; empty where it is VTK's order.
     gmsh_order: &'static [usize],
     /// For each corner, its neighbours along edges, ordered so that their determinant is positive in a good cell.
     corners: &'static [(usize, &'static [usize])],
@@ -101,7 +101,7 @@ impl CellShape {
         self.geometry().orders[1]
     }
 
-    /// Whether it has nodes in the middle of its edges.
+    /// Returns true if it has nodes in the middle of its edges.
     pub fn is_quadratic(self) -> bool {
         self != self.linear()
     }
@@ -136,7 +136,7 @@ impl CellShape {
         Self::all().find(|shape| shape.gmsh_type() == number)
     }
 
-    /// Where Gmsh has the nodes after the corners; empty where it has VTK's order.
+    /// Positions of the nodes after the corners in Gmsh's order; empty where it is VTK's order.
     ///
     /// Source: the reference manual of Gmsh, "Node ordering".
     pub(super) fn gmsh_order(self) -> &'static [usize] {

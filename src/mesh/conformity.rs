@@ -1,4 +1,4 @@
-//! Whether cells meet face to face: else the body tears there, or counts twice.
+//! Conformity of cells, which have to meet face to face: else the body tears there, or counts twice.
 
 use rustc_hash::FxHashMap;
 

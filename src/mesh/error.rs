@@ -1,10 +1,10 @@
-//! What can be wrong with a mesh or its file.
+//! Errors of a mesh or its file.
 
 use std::path::PathBuf;
 
 use super::CellShape;
 
-/// Where in a file something is wrong.
+/// Place of an error in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// Line of a text file, counted from 1.
@@ -28,7 +28,7 @@ impl std::fmt::Display for Place {
     }
 }
 
-/// Why a mesh cannot be read, made or used. Every message names place, value and remedy.
+/// Error of a mesh that cannot be read, made or used. Every message names place, value and remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshError {
     /// The file cannot be opened or read.
@@ -36,7 +36,7 @@ pub enum MeshError {
     Open {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The file name ends in nothing that a reader knows.
@@ -50,11 +50,11 @@ pub enum MeshError {
     Truncated {
         /// The file.
         path: PathBuf,
-        /// Where it ends.
+        /// Place of its end.
         place: Place,
         /// The section that is not complete.
         section: String,
-        /// What should have followed.
+        /// The content expected next.
         wanted: String,
     },
     /// Something else stands where the format wants a certain thing.
@@ -62,13 +62,13 @@ pub enum MeshError {
     Syntax {
         /// The file.
         path: PathBuf,
-        /// Where.
+        /// Place of the error.
         place: Place,
-        /// What stands there.
+        /// The content found there.
         found: String,
-        /// What should stand there.
+        /// The content expected there.
         wanted: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// A version, encoding or section that is not read.
@@ -76,11 +76,11 @@ pub enum MeshError {
     Unsupported {
         /// The file.
         path: PathBuf,
-        /// Where.
+        /// Its place.
         place: Place,
-        /// What it is.
+        /// Name of the version, encoding or section.
         what: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// A cell that is none of ours.
@@ -88,7 +88,7 @@ pub enum MeshError {
     UnsupportedElement {
         /// The file.
         path: PathBuf,
-        /// Where.
+        /// Place of the element.
         place: Place,
         /// Its number in the file.
         element: u64,
@@ -96,7 +96,7 @@ pub enum MeshError {
         kind: String,
         /// The name of that type.
         name: &'static str,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// An element refers to a node that the file does not hold.
@@ -104,7 +104,7 @@ pub enum MeshError {
     MissingNode {
         /// The file.
         path: PathBuf,
-        /// Where the element stands.
+        /// Place of the element.
         place: Place,
         /// Its number in the file.
         element: u64,
@@ -116,11 +116,11 @@ pub enum MeshError {
     DuplicateTag {
         /// The file.
         path: PathBuf,
-        /// Where the second one stands.
+        /// Place of the second one.
         place: Place,
         /// The tag.
         node: u64,
-        /// Where the first one stands.
+        /// Place of the first one.
         first: Place,
     },
     /// Two elements have the same number.
@@ -128,11 +128,11 @@ pub enum MeshError {
     DuplicateElementNumber {
         /// The file.
         path: PathBuf,
-        /// Where the second one stands.
+        /// Place of the second one.
         place: Place,
         /// The number.
         element: u64,
-        /// Where the first one stands.
+        /// Place of the first one.
         first: Place,
     },
     /// A coordinate that is no number.
@@ -140,7 +140,7 @@ pub enum MeshError {
     NonFinite {
         /// The file.
         path: PathBuf,
-        /// Where.
+        /// Place of the node.
         place: Place,
         /// The node's number in the file.
         node: u64,
@@ -154,7 +154,7 @@ pub enum MeshError {
     OutOfPlane {
         /// The file.
         path: PathBuf,
-        /// Where.
+        /// Place of the node.
         place: Place,
         /// The node's number in the file.
         node: u64,
@@ -170,7 +170,7 @@ pub enum MeshError {
     DuplicateElement {
         /// The file.
         path: PathBuf,
-        /// Where the second one stands.
+        /// Place of the second one.
         place: Place,
         /// Its number in the file.
         element: u64,
@@ -196,7 +196,7 @@ pub enum MeshError {
         wanted: usize,
         /// Found.
         found: usize,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// A list of coordinates cannot be made from an axis.
@@ -204,7 +204,7 @@ pub enum MeshError {
     Axis {
         /// x, y or z.
         axis: char,
-        /// What is wrong and how to mend it.
+        /// The defect and its remedy.
         problem: String,
     },
     /// A face of a cut-out lies between grid lines.
@@ -216,7 +216,7 @@ pub enum MeshError {
         name: String,
         /// x, y or z.
         axis: char,
-        /// Where the face is.
+        /// Coordinate of the face.
         value: f64,
         /// Largest grid line below it.
         below: f64,
@@ -232,7 +232,7 @@ pub enum MeshError {
         removed: usize,
         /// Cells of the grid.
         cells: usize,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// A displacement of nodes that would turn cells inside out.
@@ -250,7 +250,7 @@ pub enum MeshError {
         cell: usize,
         /// Its shape.
         shape: CellShape,
-        /// Where it is.
+        /// Position of its centroid.
         centroid: String,
         /// Smallest scaled Jacobian at its corners.
         value: f64,
@@ -264,11 +264,11 @@ pub enum MeshError {
         cell: usize,
         /// Its shape.
         shape: CellShape,
-        /// Where it is.
+        /// Position of its centroid.
         centroid: String,
         /// Smallest scaled Jacobian at its corners.
         value: f64,
-        /// What is needed.
+        /// Lower limit of the scaled Jacobian.
         limit: f64,
     },
     /// A cell far longer than wide.
@@ -280,7 +280,7 @@ pub enum MeshError {
         cell: usize,
         /// Its shape.
         shape: CellShape,
-        /// Where it is.
+        /// Position of its centroid.
         centroid: String,
         /// Longest edge over the shortest.
         ratio: f64,
@@ -296,9 +296,9 @@ pub enum MeshError {
         first: u32,
         /// Number of the other.
         second: u32,
-        /// Where they are.
+        /// Their position.
         position: String,
-        /// How far apart.
+        /// Distance between them.
         distance: f64,
     },
     /// A facet of more than two cells.
@@ -308,7 +308,7 @@ pub enum MeshError {
     CrowdedFacet {
         /// Number of the cell, from 0.
         cell: u32,
-        /// Where it is.
+        /// Position of its centroid.
         centroid: String,
     },
     /// A node on a face of a cell that is not its own.
@@ -318,11 +318,11 @@ pub enum MeshError {
     HangingNode {
         /// Number of the node, from 0.
         node: u32,
-        /// Where it is.
+        /// Position of the node.
         position: String,
         /// Number of the cell, from 0.
         cell: u32,
-        /// Where the cell is.
+        /// Position of the cell's centroid.
         centroid: String,
     },
     /// A node whose position is no number.
@@ -330,7 +330,7 @@ pub enum MeshError {
     NonFiniteNode {
         /// Number of the node, from 0.
         node: usize,
-        /// Where it is.
+        /// Its position.
         position: String,
     },
     /// A node that no cell uses.
@@ -338,7 +338,7 @@ pub enum MeshError {
     IsolatedNode {
         /// Number of the node, from 0.
         node: usize,
-        /// Where it is.
+        /// Its position.
         position: String,
     },
     /// A cell or set that refers to nothing.
@@ -350,9 +350,9 @@ pub enum MeshError {
         holder: String,
         /// "node" or "cell".
         kind: &'static str,
-        /// What it refers to.
+        /// Number that it refers to.
         number: u32,
-        /// How many there are.
+        /// Count of those in the mesh.
         count: usize,
     },
     /// A facet of a set that belongs to no cell.

@@ -5,7 +5,7 @@ use super::{CellShape, Mesh, MeshError};
 use crate::shape::Shape;
 use crate::tensor::Vector;
 
-/// How far a cut-out's face may lie from a grid line, as a fraction of the axis.
+/// Tolerance of a cut-out's face against a grid line, as a fraction of the axis.
 const ON_GRID: f64 = 1e-9;
 
 /// The coordinates of grid lines along one axis.

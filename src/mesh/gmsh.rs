@@ -11,7 +11,7 @@ use super::MeshError;
 use super::gmsh_kinds::{reorder, shape};
 use crate::mesh::raw::{Encoding, RawElement, RawMesh, RawNode, Source};
 
-/// What a wrong word in a text file calls for.
+/// Remedy for a wrong word in a text file.
 const REWRITE: &str = "correct it or write the file again with Gmsh";
 
 /// Parses a file.
@@ -48,7 +48,7 @@ struct Reader<'a> {
     at: usize,
     section: String,
     version: Version,
-    /// Whether binary numbers have the other byte order than this machine.
+    /// True if binary numbers have the other byte order than this machine.
     swapped: bool,
     /// Bytes of a `size_t` in the file.
     size_bytes: usize,
@@ -508,7 +508,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Where the next entry stands: in text after blanks and line ends.
+    /// Position of the next entry: in text after blanks and line ends.
     fn next_at(&self) -> usize {
         if self.source.encoding == Encoding::Binary {
             return self.at;

@@ -5,7 +5,7 @@
 //! | `cell_shape.rs` | the shapes of cells, each with its facets, edges, volume, and names in files |
 //! | `generate.rs` | line, rectangle and box with cut-outs and grading |
 //! | `read.rs` | one entry for all files |
-//! | `raw.rs` | what a file holds before it is a mesh |
+//! | `raw.rs` | content of a file before it is a mesh |
 //! | `parts.rs` | a mesh in memory, as another program hands it over |
 //! | `gmsh.rs`, `gmsh_kinds.rs` | Gmsh MSH 4.1 and 2.2, ASCII and binary |
 //! | `inp/` | decks of Abaqus and CalculiX: nodes, elements, sets, surfaces, instances |
@@ -14,11 +14,11 @@
 //! | `vtu_data.rs`, `xml.rs` | data and tags of the former |
 //! | `quality.rs` | checks that refuse a mesh no element can live on |
 //! | `boundary.rs` | boundary and interface facets, distances to them |
-//! | `conformity.rs` | whether cells meet face to face |
-//! | `visibility.rs` | which bonds leave the mesh |
+//! | `conformity.rs` | conformity of cells, which have to meet face to face |
+//! | `visibility.rs` | bonds that leave the mesh |
 //! | `dilate_erode.rs` | sets of cells that grow and shrink |
 //! | `order.rs` | cells of first and second order: corners, mid-side nodes, from the one to the other |
-//! | `error.rs` | what can be wrong |
+//! | `error.rs` | errors of a mesh or its file |
 
 use std::collections::BTreeMap;
 
@@ -74,7 +74,7 @@ pub struct Mesh<const D: usize> {
     pub facet_sets: BTreeMap<String, Vec<Facet>>,
     /// Named sets of single nodes.
     pub node_sets: BTreeMap<String, Vec<u32>>,
-    /// What the reader of its file left out, a sentence each.
+    /// Notes on what the reader of its file left out, a sentence each.
     pub notes: Vec<String>,
 }
 

@@ -5,7 +5,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use super::{Facet, Mesh};
 use crate::tensor::Vector;
 
-/// What becomes of cells of second order that are read.
+/// Treatment of cells of second order that are read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Order {
     /// They stay as they are.
@@ -45,7 +45,7 @@ impl<const D: usize> Mesh<D> {
         &self.cell(c)[..self.shapes[c].linear().node_count()]
     }
 
-    /// Whether any cell is of second order.
+    /// Returns true if any cell is of second order.
     pub fn has_quadratic_cells(&self) -> bool {
         self.shapes.iter().any(|shape| shape.is_quadratic())
     }
@@ -61,7 +61,7 @@ impl<const D: usize> Mesh<D> {
         })
     }
 
-    /// How far the nodes in the middle of edges of cell `c` lie from there, added up by coordinate \[length\]: zero where its sides are straight and halved.
+    /// Distance of the nodes in the middle of edges of cell `c` from the midpoints, summed by coordinate \[length\]: zero where its sides are straight and halved.
     pub fn bulge(&self, c: usize) -> Vector<D> {
         let x = |n: u32| self.nodes[n as usize];
         self.mid_sides(c).fold(Vector::zeros(), |sum, side| {

@@ -7,14 +7,14 @@ use std::path::PathBuf;
 
 /// A mesh in memory.
 ///
-/// What a reader makes of a file, [`MeshParts::mesh`] makes of this: elements of the largest dimension become cells, sets of them cell sets, sets of elements
+/// [`MeshParts::mesh`] makes a mesh of it as a reader does of a file: elements of the largest dimension become cells, sets of them cell sets, sets of elements
 /// of one dimension less facet sets, and so on.
 ///
 /// Shapes: nodes and elements are numbered from 0, elements through all blocks.
 /// Units: whatever the scene uses for length.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshParts {
-    /// What messages call it.
+    /// Name in messages.
     pub name: String,
     /// Positions; zero beyond the dimension of the mesh.
     pub points: Vec<[f64; 3]>,

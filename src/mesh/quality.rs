@@ -16,7 +16,7 @@ pub const LARGEST_EDGE_RATIO: f64 = 3e4;
 /// Nodes closer than this fraction of the mesh's largest extent lie at one place.
 const COINCIDENT: f64 = 1e-12;
 
-/// What [`check`] measured.
+/// Quality of a mesh, as [`check`] measures it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quality {
     /// Shortest edge of all cells \[length\].

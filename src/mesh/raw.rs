@@ -1,4 +1,4 @@
-//! What a mesh file holds before it is a mesh: nodes, elements and groups as they are read, and where in the file an error lies.
+//! Content of a mesh file before it is a mesh: nodes, elements and groups as they are read, and the places of errors in the file.
 
 use super::error::axis_name;
 use super::{CellShape, Facet, Mesh, MeshError, Order, Place};
@@ -7,7 +7,7 @@ use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 
-/// How far out of its plane a node of a 2D mesh may lie, as a fraction of the mesh's extent.
+/// Tolerance of a node of a 2D mesh out of its plane, as a fraction of the mesh's extent.
 const OUT_OF_PLANE: f64 = 1e-12;
 
 /// The file behind a mesh, for messages.
@@ -15,7 +15,7 @@ pub(super) struct Source<'a> {
     pub path: PathBuf,
     pub bytes: &'a [u8],
     pub encoding: Encoding,
-    /// Where the text of other files begins that the file includes; empty where all is of one file.
+    /// Pieces of the text by the file that they come from; empty where all is of one file.
     pub pieces: &'a [Piece],
 }
 
@@ -29,7 +29,7 @@ pub(super) struct Piece {
     pub line: usize,
 }
 
-/// How positions in a file are told to its reader.
+/// Unit in which positions in a file are given in messages.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Encoding {
     /// By lines.
@@ -41,7 +41,7 @@ pub(super) enum Encoding {
 }
 
 impl<'a> Source<'a> {
-    /// Where the next word begins: after blanks and line ends from byte `at` on.
+    /// Position of the next word: after blanks and line ends from byte `at` on.
     pub fn next(&self, at: usize) -> usize {
         let rest = &self.bytes[at..];
         let blanks = rest.iter().position(|b| !b.is_ascii_whitespace());
@@ -122,9 +122,9 @@ pub(super) struct RawNode {
 pub(super) struct RawElement {
     pub tag: u64,
     pub shape: CellShape,
-    /// Where its node tags start in [`RawMesh::element_nodes`].
+    /// Start of its node tags in [`RawMesh::element_nodes`].
     pub start: usize,
-    /// Which of [`RawMesh::groups`] it is in.
+    /// Index of its group in [`RawMesh::groups`].
     pub group: u32,
     /// Byte where it stands.
     pub at: usize,
@@ -137,7 +137,7 @@ pub(super) struct RawMesh {
     pub element_nodes: Vec<u64>,
     /// Lists of set names; the first one is empty.
     pub groups: Vec<Vec<String>>,
-    /// What the reader left out, a sentence each.
+    /// Notes on what the reader left out, a sentence each.
     pub notes: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! One entry for all mesh files, and what their readers share: from nodes and elements as a file holds them to a [`Mesh`].
+//! One entry for all mesh files, and the parts common to their readers: from nodes and elements as a file holds them to a [`Mesh`].
 
 use std::path::Path;
 

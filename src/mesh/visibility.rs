@@ -1,4 +1,4 @@
-//! Which bonds leave the mesh: through a hole, a slit or a notch.
+//! Visibility of bonds: those that leave the mesh through a hole, a slit or a notch.
 
 use std::collections::HashMap;
 
@@ -26,7 +26,7 @@ pub struct SegmentCutter<const D: usize> {
 /// Planes of the faces of a convex body at most: more are those of a curved surface, and looking at all of them takes longer than asking about bonds.
 const MOST_PLANES: usize = 16;
 
-/// How far a point may lie beyond a plane, over the size of the body: round-off.
+/// Tolerance for a point beyond a plane, over the size of the body: round-off.
 const CONVEX_TOUCH: f64 = 1e-13;
 
 /// A point, edge or triangle of the boundary.
@@ -90,7 +90,7 @@ impl<const D: usize> SegmentCutter<D> {
         Self::new(mesh, &mesh.outer_facets())
     }
 
-    /// Whether the boundary is that of a convex body with few faces, and all of these points lie in it: then no bond between them leaves it, and none has to be asked about.
+    /// Returns true if the boundary is that of a convex body with few faces, and all of these points lie in it: then no bond between them leaves it, and none has to be tested.
     pub fn is_convex_around(&self, points: &[Vector<D>]) -> bool {
         let corners = || self.facets.iter().flat_map(|facet| &facet.corners);
         let size = corners().fold(0.0f64, |most, x| most.max(x.amax()));
@@ -210,7 +210,7 @@ impl<const D: usize> SegmentCutter<D> {
             .map(|&f| &self.facets[f as usize])
     }
 
-    /// Whether a bond of length `reach` or less that starts at `x` can meet a facet; if not, its family needs no test.
+    /// Returns true if a bond of length `reach` or less that starts at `x` can meet a facet; if not, its family needs no test.
     pub fn near(&self, x: &Vector<D>, reach: f64) -> bool {
         let reach = reach * (1.0 + TOUCH);
         let mut found = false;
@@ -221,7 +221,7 @@ impl<const D: usize> SegmentCutter<D> {
         found
     }
 
-    /// Whether the bond from `a` to `b`, both in the mesh, leaves it on its way. The same answer for `b` to `a`.
+    /// Returns true if the bond from `a` to `b`, both in the mesh, leaves it on its way. The same answer for `b` to `a`.
     pub fn cuts(&self, a: &Vector<D>, b: &Vector<D>) -> bool {
         let length = (b - a).norm();
         let skin = TOUCH * length;
@@ -300,7 +300,7 @@ impl<const D: usize> Simplex<D> {
             })
     }
 
-    /// How the segment meets the facet; where it touches goes to `touches`.
+    /// Returns the kind of intersection of the segment with the facet; positions of touching go to `touches`.
     fn meet(&self, a: &Vector<D>, b: &Vector<D>, skin: f64, touches: &mut Vec<f64>) -> Meeting {
         let height = |x: &Vector<D>| (x - self.corners[0]).dot(&self.normal);
         let (p, q) = (height(a), height(b));
@@ -326,7 +326,7 @@ impl<const D: usize> Simplex<D> {
         Meeting::Touching
     }
 
-    /// Whether a point of the facet is more than `skin` away from its rim.
+    /// Returns true if a point of the facet is more than `skin` away from its rim.
     fn clear_of_rim(&self, x: &Vector<D>, skin: f64) -> bool {
         (0..D).all(|i| {
             let (p, q) = (self.corners[i], self.corners[(i + 1) % D]);
@@ -497,7 +497,7 @@ mod tests {
         });
     }
 
-    /// Whether no bond of the nodes of a block can leave it, turned by an angle in its first plane: whole, or without a corner.
+    /// Returns true if no bond of the nodes of a block can leave it, turned by an angle in its first plane: whole, or without a corner.
     fn convex<const D: usize>(is_cut: bool, is_simplicial: bool, angle: f64) -> bool {
         let mut grid = Grid::<D>::new(std::array::from_fn(|_| axis(8)));
         if is_cut {

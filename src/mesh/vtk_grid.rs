@@ -105,7 +105,7 @@ pub(super) struct Grid {
     pub points: u64,
     /// VTK's number for the type of each cell.
     pub types: Vec<u8>,
-    /// Where the nodes of each cell end in `nodes`.
+    /// End of the nodes of each cell in `nodes`.
     pub ends: Vec<u64>,
     pub nodes: Vec<u64>,
     /// Integer arrays with a number per cell.
@@ -148,7 +148,7 @@ impl Grid {
         }
     }
 
-    /// Whether the point at hand is one that is kept.
+    /// Returns true if the current point is one that is kept.
     pub(super) fn is_open(&self) -> bool {
         let last = self.coordinates.len().checked_sub(1);
         last.is_some_and(|k| self.used[k] == (self.seen - 1) / 3)

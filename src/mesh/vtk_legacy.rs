@@ -2,7 +2,7 @@
 //!
 //! Source: the VTK user's guide, "Simple legacy formats"; `vtkDataWriter` for the names of types that it leaves out (`vtktypeint64`, `vtkIdType`) and for
 //! version 5, whose cells are offsets and connectivity. Binary numbers have the most significant byte first. Everything but points, cells and
-//! integers per cell is passed over.
+//! integers per cell is skipped.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use super::MeshError;
 use crate::mesh::raw::{Encoding, Source};
 use crate::mesh::vtk_grid::{Grid, Kind, Number};
 
-/// What a wrong word in a file calls for.
+/// Remedy for a wrong word in a file.
 const REWRITE: &str = "write the file again, for instance with VTK, ParaView or meshio";
 
 /// Parses a file.
@@ -38,7 +38,7 @@ struct Reader<'a> {
     section: String,
     points: Vec<f64>,
     grid: Grid,
-    /// Whether data follow that belong to cells.
+    /// True while data of cells follow, false for those of points; none before any data.
     of_cells: Option<bool>,
 }
 
@@ -263,7 +263,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Passes over what is told of an array, up to an empty line.
+    /// Skips the metadata of an array, up to an empty line.
     fn skip_metadata(&mut self) {
         self.line();
         while !self.line().is_empty() {}
@@ -444,7 +444,7 @@ impl<'a> Reader<'a> {
         word.parse().map_err(|_| self.syntax(at, &word, wanted))
     }
 
-    /// The next word; what is no UTF-8 is told as such.
+    /// The next word; bytes that are no UTF-8 are replaced.
     fn word(&mut self, wanted: &str) -> Result<String, MeshError> {
         let start = self.next();
         let rest = &self.source.bytes[start..];
@@ -460,7 +460,7 @@ impl<'a> Reader<'a> {
         Ok(String::from_utf8_lossy(&rest[..length]).into_owned())
     }
 
-    /// Where the next word begins.
+    /// Position of the next word.
     fn next(&self) -> usize {
         self.source.next(self.at)
     }

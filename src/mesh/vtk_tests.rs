@@ -218,7 +218,7 @@ fn wrong_arrays_are_named_with_their_line() {
     }
 }
 
-/// What a file announces takes no memory: points and arrays that no cell uses are not kept.
+/// Sizes that a file announces take no memory: points and arrays that no cell uses are not kept.
 #[test]
 fn points_that_no_cell_uses_are_not_kept() {
     let folder = tempfile::tempdir().unwrap();

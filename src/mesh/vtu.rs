@@ -15,7 +15,7 @@ use super::xml::{Event, Tag, Xml};
 use crate::mesh::raw::{Encoding, Source};
 use crate::mesh::vtk_grid::{Grid, Kind, Number};
 
-/// What a wrong file calls for.
+/// Remedy for a wrong file.
 const REWRITE: &str = "write the file again, for instance with VTK, ParaView or meshio";
 
 /// An array as its tag describes it.
@@ -51,7 +51,7 @@ struct Piece<'a> {
 struct File<'a> {
     source: Source<'a>,
     storage: Storage,
-    /// What follows the underscore of the appended data, and whether it is base64.
+    /// Bytes after the underscore of the appended data, and true if they are base64.
     appended: Option<(&'a [u8], bool)>,
 }
 

@@ -8,7 +8,7 @@ use flate2::read::ZlibDecoder;
 
 use crate::mesh::vtk_grid::Kind;
 
-/// How numbers are stored in the file.
+/// Storage of numbers in the file.
 #[derive(Clone, Copy)]
 pub(super) struct Storage {
     pub is_big_endian: bool,

@@ -4,7 +4,7 @@
 
 use std::borrow::Cow;
 
-/// What stands next in a file.
+/// Next item of a file.
 #[derive(Debug, PartialEq)]
 pub(super) enum Event<'a> {
     /// `<NAME …>`, or `<NAME …/>`, which ends where it begins.
@@ -36,7 +36,7 @@ pub(super) struct Xml<'a> {
 }
 
 impl<'a> Xml<'a> {
-    /// Reads on; declarations and comments are passed over.
+    /// Reads on; declarations and comments are skipped.
     pub fn next(&mut self) -> Result<Event<'a>, Wrong> {
         loop {
             let rest = &self.bytes[self.at..];
@@ -85,14 +85,14 @@ impl<'a> Xml<'a> {
         }
     }
 
-    /// How far on `end` stands.
+    /// Distance to `end` in bytes.
     fn until(&self, end: &'static str) -> Result<usize, Wrong> {
         let rest = &self.bytes[self.at..];
         let found = rest.windows(end.len()).position(|w| w == end.as_bytes());
         found.ok_or((self.at, end))
     }
 
-    /// How far on the tag that begins here ends; `>` within quotes belongs to a value.
+    /// Distance to the end of the tag that begins here; `>` within quotes belongs to a value.
     fn end_of_tag(&self) -> Result<usize, Wrong> {
         let mut quote = None;
         for (k, &b) in self.bytes[self.at..].iter().enumerate().skip(1) {

@@ -33,7 +33,7 @@ const HEAD: usize = 8 + 4 + 8;
 /// Bytes after the state: its length and the CRC-32 of all before the CRC.
 const TAIL: usize = 8 + 4;
 
-/// How often something is done.
+/// Interval at which something is repeated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
     /// After this many steps.
@@ -42,13 +42,13 @@ pub enum Pace {
     Clock(Duration),
 }
 
-/// What is wrong with a pace.
+/// Error of a pace that cannot be parsed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "`{text}` is no pace; write a number of steps such as 1000, or a time such as 30s, \"10 min\" or 2h"
 )]
 pub struct PaceError {
-    /// What was given.
+    /// Text that was given.
     pub text: String,
 }
 
@@ -85,13 +85,13 @@ impl FromStr for Pace {
     }
 }
 
-/// Why a run cannot go on from a checkpoint.
+/// Error of a run that cannot go on from a checkpoint.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
     /// There is none.
     #[error("there is no checkpoint {}; run without --resume, or name the folder of the run by --output", path.display())]
     None {
-        /// Where it would be.
+        /// Path at which it would be.
         path: PathBuf,
     },
     /// The file cannot be read.
@@ -99,7 +99,7 @@ pub enum CheckpointError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The file is something else.
@@ -147,7 +147,7 @@ pub enum CheckpointError {
     Content {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The defect.
         message: String,
     },
 }
@@ -181,7 +181,7 @@ impl CheckpointError {
     }
 }
 
-/// Which of two files a state was read from.
+/// Source of a state, one of two files.
 #[derive(Debug)]
 pub enum Found {
     /// The last one that was written.
@@ -203,12 +203,12 @@ impl CheckpointFile {
         Self { path, print }
     }
 
-    /// Where the last checkpoint lies.
+    /// Path of the last checkpoint.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Where the one before lies.
+    /// Path of the checkpoint before the last.
     pub fn previous(&self) -> PathBuf {
         let mut name = self.path.file_name().unwrap_or_default().to_os_string();
         name.push(".previous");
@@ -358,7 +358,7 @@ struct Checked<W> {
     inner: W,
     hasher: crc32fast::Hasher,
     bytes: u64,
-    /// Why a write failed.
+    /// Error of a write that failed.
     failed: Option<std::io::Error>,
 }
 

@@ -1,4 +1,4 @@
-//! Claims on output folders: who writes which files, so that no run takes another one's files for leftovers or writes over them.
+//! Claims on output folders and their files, so that no run takes another one's files for leftovers or writes over them.
 //!
 //! A claim is the file `.NAME.lock` in the folder, locked by the operating system while the run lasts. It lists the process, the scene and the files that
 //! belong to the run. The system lifts the lock when the process ends, however it ends, so a claim that is left behind by a killed run is known from
@@ -22,12 +22,12 @@ pub struct Files {
     pub name: String,
     /// Names, each in full.
     pub files: Vec<String>,
-    /// Whether there are files `NAME_0000.vtu`, `NAME_0001.vtu`, … too, or `NAME_0000.pvtu`, … with a piece of each process.
+    /// True if there are files `NAME_0000.vtu`, `NAME_0001.vtu`, … too, or `NAME_0000.pvtu`, … with a piece of each process.
     pub series: bool,
 }
 
 impl Files {
-    /// Whether a file is one of these.
+    /// Returns true if a file is one of these.
     pub fn contains(&self, file: &str) -> bool {
         self.files.iter().any(|own| own == file) || (self.series && self.is_of_series(file))
     }
@@ -88,7 +88,7 @@ impl Files {
     }
 }
 
-/// What a claim says.
+/// Content of a claim.
 #[derive(Debug, Serialize, Deserialize)]
 struct Holder {
     process: u32,
@@ -228,7 +228,7 @@ fn others(folder: &Path, own: &Path) -> Vec<PathBuf> {
     paths.filter(|p| p.is_file() && p != own).collect()
 }
 
-/// Whether the process of a claim lives.
+/// Returns true if the process of a claim lives.
 fn is_held(path: &Path) -> bool {
     let Ok(file) = File::open(path) else {
         return false;
@@ -254,7 +254,7 @@ fn claimed(folder: &Path, claim: &Path, file: Option<String>) -> ObserveError {
     }
 }
 
-/// Whether an open file is the one that lies at `path`.
+/// Returns true if an open file is the one that lies at `path`.
 #[cfg(unix)]
 fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt as _;

@@ -1,4 +1,4 @@
-//! What breaking bonds cost, in a summary.
+//! Energy and area of broken bonds, in a summary.
 
 use std::fmt;
 
@@ -11,13 +11,13 @@ use super::report::number;
 /// Units: J and m² (per metre of thickness and m in 2D, per square metre of section and a number in 1D).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CrackSummary {
-    /// What was stored just before less what was stored just after bonds broke.
+    /// Stored energy just before less that just after bonds broke.
     pub dissipated_energy: f64,
     /// Area of the cracks, a length in 2D, from the broken bonds between next neighbours.
     pub area: f64,
     /// Dissipated energy over area; none without a crack.
     pub energy_per_area: Option<f64>,
-    /// What a plane along the lattice's axes takes per area at the critical stretch; none with several lattices.
+    /// Energy per area of a plane along the lattice's axes at the critical stretch; none with several lattices.
     pub plane_energy: Option<f64>,
     /// The fracture energy that the scene has; none where it has a critical stretch.
     pub fracture_energy: Option<f64>,

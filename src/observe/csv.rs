@@ -140,7 +140,7 @@ impl CsvTable {
         self.rows
     }
 
-    /// Where the table is.
+    /// Path of the table.
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -9,7 +9,7 @@ use crate::parallel;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use flate2::{Compression as Level, write::ZlibEncoder};
 
-/// How arrays are stored.
+/// Storage of arrays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Compression {
     /// As they are: about four times larger, about five times as fast to write.
@@ -27,7 +27,7 @@ const LEVEL: u32 = 1;
 
 /// A type of numbers that VTK knows.
 pub(super) trait Number: Copy + Sync {
-    /// What VTK calls it.
+    /// Name of the type in VTK.
     const TYPE: &'static str;
 
     /// Appends the bytes of a number, the lowest first.

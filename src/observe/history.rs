@@ -63,12 +63,12 @@ impl History {
         &self.header
     }
 
-    /// Where the table is, once it is begun.
+    /// Path of the table, once it is begun.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Whether the table is there.
+    /// Returns true if the table exists.
     pub fn is_begun(&self) -> bool {
         self.table.is_some()
     }

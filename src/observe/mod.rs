@@ -1,4 +1,4 @@
-//! What leaves a computation: fields for ParaView, tables and summaries. Pictures are drawn by `bondline-study`, progress by `bondline-terminal`.
+//! Output of a computation: fields for ParaView, tables and summaries. Pictures are drawn by `bondline-study`, progress by `bondline-terminal`.
 //!
 //! | file | what |
 //! |---|---|
@@ -8,12 +8,12 @@
 //! | `series.rs` | VTU files over time and their PVD |
 //! | `history.rs` | tables that grow with a run, and are cut where it resumes |
 //! | `checkpoint.rs` | the state of a run, whole or not at all |
-//! | `claim.rs` | who writes into a folder, so that no two runs write the same files |
+//! | `claim.rs` | claims on a folder, so that no two runs write the same files |
 //! | `csv.rs` | values along a line or at probes, row by row |
 //! | `report.rs` | rows with a verdict, their table for people and their JSON |
-//! | `summary.rs`, `motion_summary.rs` | what one run did: sizes, choices, timings, balance; energies over time |
-//! | `cracks.rs` | what breaking bonds cost, in a summary |
-//! | `proof.rs` | what was shown about a model before it was solved |
+//! | `summary.rs`, `motion_summary.rs` | summary of one run: sizes, choices, timings, balance; energies over time |
+//! | `cracks.rs` | energy and area of broken bonds, in a summary |
+//! | `proof.rs` | results of the checks of a model before it is solved |
 //! | `rezoning_event.rs` | changes of the nonlocal zone during a run |
 //! | `observer.rs` | results handed to the program that started a run |
 //! | `atomic_file.rs` | whole files or none: written beside, then renamed |
@@ -39,7 +39,7 @@ pub use observer::Observer;
 
 use std::path::{Path, PathBuf};
 
-/// Why something could not be written.
+/// Error of an output that could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ObserveError {
     /// The folder of an output is missing and cannot be made.
@@ -47,7 +47,7 @@ pub enum ObserveError {
     Folder {
         /// The folder.
         path: PathBuf,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// A file cannot be written.
@@ -55,7 +55,7 @@ pub enum ObserveError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// Another run writes the same file.
@@ -71,7 +71,7 @@ pub enum ObserveError {
     OfAnother {
         /// The file.
         path: PathBuf,
-        /// Whose it is.
+        /// Its owner.
         owner: String,
     },
     /// A file of another process does not appear in the folder.
@@ -85,7 +85,7 @@ pub enum ObserveError {
     OfProcess {
         /// The folder, or the file that one process would write.
         path: PathBuf,
-        /// Which process, and what it said.
+        /// Number of the process and its message.
         message: String,
     },
     /// The encoder refused the data.
@@ -93,9 +93,9 @@ pub enum ObserveError {
     Encode {
         /// The file.
         path: PathBuf,
-        /// What it was to be.
+        /// Format that it was to have.
         format: &'static str,
-        /// What the encoder said.
+        /// Message of the encoder.
         message: String,
     },
     /// A field has the wrong number of values.
@@ -137,7 +137,7 @@ pub enum ObserveError {
     Cells {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The defect.
         message: String,
     },
     /// There is nothing to write.
@@ -145,7 +145,7 @@ pub enum ObserveError {
     Empty {
         /// The file.
         path: PathBuf,
-        /// What is missing.
+        /// The missing items.
         what: &'static str,
     },
     /// A table that a run goes on with has lost rows.
@@ -192,7 +192,7 @@ impl ObserveError {
     }
 }
 
-/// What the user can do about an error of the operating system.
+/// Remedy of the user for an error of the operating system.
 fn remedy(error: &std::io::Error) -> &'static str {
     use std::io::ErrorKind;
     match error.kind() {

@@ -1,4 +1,4 @@
-//! What one run in time did: why it ended, its energies, growth without work, rotation.
+//! Summary of one run in time: the reason why it ended, its energies, growth without work, rotation.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ use super::report::{components, grouped, number};
 use super::rezoning_event::{self, Switch};
 use crate::system::Traffic;
 
-/// Why a run in time ended.
+/// Reason why a run in time ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ended {
@@ -25,7 +25,7 @@ pub enum Ended {
     ElementsRotated,
 }
 
-/// Energy that a motion gained without work: what a coupling of unsymmetric stiffness feeds to it, or a step that has become too large for its law.
+/// Energy that a motion gained without work: by a coupling of unsymmetric stiffness, or by a step that has become too large for its law.
 ///
 /// Parts are those of the largest energy so far, or of the work where that is larger.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -40,12 +40,12 @@ pub struct EnergyGain {
     pub limit: f64,
     /// Step and time at which it first went beyond 1 %.
     pub first_told: Option<(u64, f64)>,
-    /// Whether the undeformed body could not gain any: a law that changes with the strain then does.
+    /// True if the undeformed body could not gain any: a law that changes with the strain then does.
     pub by_law: bool,
 }
 
 impl EnergyGain {
-    /// What a summary warns of, from 1 % on.
+    /// Returns the warning of a summary, from 1 % on.
     pub fn warning(&self) -> Option<String> {
         let (step, time) = self.first_told?;
         let cause = match self.by_law {
@@ -75,7 +75,7 @@ pub struct Rotation {
     pub place: Vec<f64>,
     /// Step and time, of a run in time or under a load that grows.
     pub when: Option<(u64, f64)>,
-    /// What is for small rotations adds to lengths at this angle, `1/cos θ − 1`.
+    /// Relative error of lengths by kinematics of small rotations at this angle, `1/cos θ − 1`.
     pub length_error: f64,
     /// That over the stretch at which the bonds beside them break or soften, where it is a tenth or more.
     pub of_failure: Option<f64>,
@@ -86,7 +86,7 @@ pub struct Rotation {
 }
 
 impl Rotation {
-    /// What a summary warns of.
+    /// Returns the warning of a summary.
     pub fn warning(&self) -> String {
         let when = self.when.map_or_else(String::new, |(step, time)| {
             format!(" at step {step}, t = {}", number(time))
@@ -116,22 +116,22 @@ impl Rotation {
     }
 }
 
-/// What a rigid impactor did.
+/// Motion and contact force of a rigid impactor.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ImpactorSummary {
     /// Its name.
     pub name: String,
-    /// Where it is at the end \[m\].
+    /// Its position at the end \[m\].
     pub position: Vec<f64>,
     /// Its velocity at the end \[m/s\].
     pub velocity: Vec<f64>,
     /// Its momentum at the end \[kg m/s\]; none of one whose motion is prescribed.
     pub momentum: Option<Vec<f64>>,
-    /// What it has given the body of its momentum \[kg m/s\]; none as above.
+    /// Momentum that it has transferred to the body \[kg m/s\]; none as above.
     pub transferred: Option<Vec<f64>>,
     /// The largest force between it and the body \[N\]; zero if they never touched.
     pub peak_force: f64,
-    /// When that was \[s\].
+    /// Time of that force \[s\].
     pub peak_time: f64,
     /// Nodes and points that touched it then.
     pub peak_sites: u64,
@@ -162,10 +162,10 @@ impl ImpactorSummary {
     }
 }
 
-/// What became of a scene in time.
+/// Results of a scene in time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MotionSummary {
-    /// Why it ended.
+    /// Reason why it ended.
     pub ended: Ended,
     /// Steps since the beginning, those before a checkpoint included.
     pub steps: u64,
@@ -183,29 +183,29 @@ pub struct MotionSummary {
     pub stored_energy: f64,
     /// Work of loads and supports.
     pub external_work: f64,
-    /// Energy at the start and work, less kinetic and stored energy: what broken bonds took, and what the seam did.
+    /// Energy at the start and work, less kinetic and stored energy: the energy of broken bonds, and that gained or lost at the seam.
     pub missing_energy: f64,
     /// Energy gained without work; none of a motion whose balance closes by construction.
     pub energy_gain: Option<EnergyGain>,
-    /// What breaking bonds cost; none where none can break.
+    /// Energy and area of broken bonds; none where none can break.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cracks: Option<CrackSummary>,
     /// Energy that a law with memory dissipated \[J\].
     pub inelastic_energy: Option<f64>,
-    /// What each rigid impactor did.
+    /// Motion and contact force of each rigid impactor.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub impactors: Vec<ImpactorSummary>,
     /// Bonds broken, each once for each direction.
     pub broken_bonds: u64,
-    /// When damage reached the edge of the nonlocal zone, and where.
+    /// Time at which damage reached the edge of the nonlocal zone, and the place.
     pub edge_reached: Option<(f64, Vec<f64>)>,
     /// Steps per second of this run, writing included.
     pub steps_per_second: f64,
-    /// When the nonlocal zone changed, and what that cost, of a zone that follows the crack.
+    /// Changes of the nonlocal zone, and their cost, of a zone that follows the crack.
     pub switches: Vec<Switch>,
-    /// What the nonlocal zone has of the body's volume at the start, the most that it had, and at the end.
+    /// Share of the nonlocal zone in the body's volume at the start, its maximum, and at the end.
     pub nonlocal_share: [f64; 3],
-    /// What each of several processes exchanged for its steps, by their number; none where each has the numbers of all sites in every step.
+    /// Data that each of several processes exchanged for its steps, by their number; none where each has the numbers of all sites in every step.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub processes: Vec<Traffic>,
 }

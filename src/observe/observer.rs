@@ -7,7 +7,7 @@ use super::vtu::Snapshot;
 ///
 /// A static run shows one snapshot, a run in time one for each time that is written. Calls come from the thread that runs the scene.
 pub trait Observer: std::fmt::Debug + Sync {
-    /// Whether the run writes files as well.
+    /// Returns true if the run writes files as well.
     fn wants_files(&self) -> bool {
         true
     }

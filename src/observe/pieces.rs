@@ -11,10 +11,10 @@ use super::vtu::{Compression, Snapshot, escape, write_pvtu, write_vtu};
 use crate::regular_file;
 use crate::system::{Ranks, first_text};
 
-/// How often the first process looks for the pieces of others, which a file system may show late.
+/// Number of times that the first process looks for the pieces of others, which a file system may show late.
 const LOOKS: u32 = 20;
 
-/// Between two looks.
+/// Time between two looks.
 const LOOK: Duration = Duration::from_millis(100);
 
 /// The files that several processes write in place of `STEM.vtu`: `STEM_p0.vtu`, `STEM_p1.vtu`, … of those that have cells, and `STEM.pvtu` over them.
@@ -147,7 +147,7 @@ pub fn write_pieces(whole: &Path, own: &Snapshot, ranks: &dyn Ranks) -> Result<(
     agreed(Some(ranks), listed, whole)
 }
 
-/// What a VTU or PVTU file is called without its end, and without the number of a process.
+/// Name of a VTU or PVTU file without its extension and without the number of a process.
 pub(super) fn stem(file: &str) -> Option<&str> {
     if let Some(stem) = file.strip_suffix(".pvtu") {
         return Some(stem);

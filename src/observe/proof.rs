@@ -1,16 +1,16 @@
-//! What was shown about a model before it was solved, as data: one part per check, for people and as JSON.
+//! Results of the checks of a model before it is solved, as data: one part per check, for people and as JSON.
 //!
-//! The checks themselves are in `scene::proof`; limits and their reasons are in `docs/proof.md`.
+//! The checks themselves are in `run::proof`; limits and their reasons are in `docs/proof.md`.
 
 use std::fmt;
 
 use serde::Serialize;
 
-/// How a finding is taken.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Severity {
-    /// The run goes on and tells it.
+    /// The run goes on with a warning.
     Warning,
     /// The run does not start.
     Refusal,
@@ -19,41 +19,41 @@ pub enum Severity {
 /// A figure beyond its limit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
-    /// How it is taken.
+    /// Its severity.
     pub severity: Severity,
-    /// Where, one coordinate per dimension \[m\]; empty where no single place is to blame.
+    /// Place, one coordinate per dimension \[m\]; empty where no single place is to blame.
     pub place: Vec<f64>,
     /// The figure, in the unit that the part states.
     pub value: f64,
     /// The limit that it exceeds, in the same unit.
     pub limit: f64,
-    /// What is wrong, where, by how much, and what to do: one sentence for people.
+    /// The defect, its place and size, and a remedy: one sentence for people.
     pub message: String,
 }
 
 /// A figure of a check.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figure {
-    /// What it measures.
+    /// Quantity that it measures.
     pub name: String,
     /// Its value.
     pub value: f64,
 }
 
-/// What one check has shown.
+/// Result of one check.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Part {
     /// The check: `loads`, `affine`, `surface`, `symmetry`, `quadratic`, `growth`.
     pub name: &'static str,
-    /// What it found within its limits, in a few words.
+    /// Result within its limits, in a few words.
     pub line: String,
     /// Every figure, for `--json`.
     pub figures: Vec<Figure>,
-    /// What lies beyond the limits.
+    /// Figures beyond their limits.
     pub findings: Vec<Finding>,
 }
 
-/// What was shown about a model before it was solved.
+/// Results of all checks of a model before it is solved.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct Proof {
@@ -62,7 +62,7 @@ pub struct Proof {
 }
 
 impl Proof {
-    /// Whether nothing was checked.
+    /// Returns true if nothing was checked.
     pub fn is_empty(&self) -> bool {
         self.parts.is_empty()
     }
@@ -86,7 +86,7 @@ impl Proof {
 }
 
 impl fmt::Display for Proof {
-    /// One line per part; findings are told among the warnings.
+    /// One line per part; findings are listed among the warnings.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for part in &self.parts {
             writeln!(f, "proof: {:<16} {}", part.name, part.line)?;

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-/// How a row fared.
+/// Verdict on a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -36,7 +36,7 @@ impl Verdict {
     }
 }
 
-/// Which way a limit works; only the text table shows it.
+/// Sense of a limit; only the text table shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bound {
     /// No limit.
@@ -52,22 +52,22 @@ pub enum Bound {
 /// One figure of one case.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TableRow {
-    /// What was run.
+    /// Case that was run.
     pub case: String,
-    /// What was measured, with its unit if it has one.
+    /// Quantity that was measured, with its unit if it has one.
     pub quantity: String,
     /// The figure; `null` in JSON if it is not finite.
     pub value: f64,
-    /// What an independent source gives.
+    /// Value from an independent source.
     pub reference: Option<f64>,
-    /// What the value must keep; see [`Bound`].
+    /// Limit that the value must keep; see [`Bound`].
     pub limit: Option<f64>,
-    /// How it fared.
+    /// Verdict on the value.
     pub verdict: Verdict,
-    /// Why, where the verdict asks for it.
+    /// Reason, where the verdict asks for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// Which way the limit works.
+    /// Sense of the limit.
     #[serde(skip)]
     pub bound: Bound,
 }
@@ -207,7 +207,7 @@ impl TableRow {
     }
 }
 
-/// How a table is laid out for people.
+/// Layout of a table for people.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Columns {
     /// One line per row, with reference, limit and verdict.
@@ -220,7 +220,7 @@ pub enum Columns {
 /// Rows under a title.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// What the rows are about.
+    /// Subject of the rows.
     pub title: String,
     /// The rows, in the order they are printed.
     pub rows: Vec<TableRow>,
@@ -393,7 +393,7 @@ impl Table {
     }
 }
 
-/// What a command prints its tables as.
+/// Format in which a command prints its tables.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Format {
     /// Text for people.

@@ -1,4 +1,4 @@
-//! Tables, their verdicts and what is printed of them.
+//! Tests of tables, their verdicts and their printed form.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! Changes of the nonlocal zone during a run, as the summary tells of them.
+//! Changes of the nonlocal zone during a run, as the summary reports them.
 
 use std::fmt;
 
@@ -17,7 +17,7 @@ pub struct Switch {
     pub added: usize,
     /// Cells that became local.
     pub removed: usize,
-    /// What the nonlocal zone has of the body's volume from then on.
+    /// Share of the nonlocal zone in the body's volume from then on.
     pub share: f64,
     /// Kinetic and stored energy before.
     pub energy: f64,
@@ -25,9 +25,9 @@ pub struct Switch {
     pub kinetic_jump: f64,
     /// Stored energy after less before.
     pub stored_jump: f64,
-    /// What of the energy a scale of the new sites' velocities gave back; zero if that would have been too much for them.
+    /// Energy that a scaling of the new sites' velocities gave back; zero if that would have been too much for them.
     pub energy_restored: f64,
-    /// What of the linear momentum the change would have lost, and a velocity of the new sites gave back; its norm.
+    /// Norm of the linear momentum that the change would have lost, and a velocity of the new sites gave back.
     pub momentum_restored: f64,
     /// Norm of the change of the angular momentum about the middle of the mesh.
     pub angular_jump: f64,
@@ -60,7 +60,7 @@ impl Switch {
     }
 }
 
-/// Tells of all changes of a run, if there are any.
+/// Writes all changes of a run, if there are any.
 pub(super) fn write(
     switches: &[Switch],
     share: [f64; 3],

@@ -1,4 +1,4 @@
-//! What one run did: sizes, choices made, seconds per stage, memory, balance of forces.
+//! Summary of one run: sizes, choices made, seconds per stage, memory, balance of forces.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -14,7 +14,7 @@ use super::report::{aligned, components, number};
 /// Seconds of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Stage {
-    /// What was done.
+    /// Name of the stage.
     pub name: String,
     /// Wall-clock seconds.
     pub seconds: f64,
@@ -122,7 +122,7 @@ fn in_status(status: &str, key: &str) -> Option<u64> {
     Some(kibibytes * 1024)
 }
 
-/// How large the model is.
+/// Sizes of the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Sizes {
     /// FE nodes of the mesh.
@@ -144,9 +144,9 @@ pub struct Sizes {
 /// A decision that the scene left open.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Decision {
-    /// What was chosen.
+    /// The choice made.
     pub choice: String,
-    /// For which reason.
+    /// Its reason.
     pub why: String,
 }
 
@@ -186,7 +186,7 @@ impl SectionForce {
     }
 }
 
-/// What one run did, for `run --json` and for people.
+/// Summary of one run, for `run --json` and for people.
 ///
 /// Units: those of the scene; with SI units forces are in N and energies in J (per metre of thickness in 2D, per square
 /// metre of section in 1D).
@@ -198,7 +198,7 @@ pub struct RunSummary {
     pub dimension: usize,
     /// Coupling method, as the scene names it.
     pub coupling: String,
-    /// How large the model is.
+    /// Sizes of the model.
     pub sizes: Sizes,
     /// Decisions that the scene left open.
     pub choices: Vec<Decision>,
@@ -227,16 +227,16 @@ pub struct RunSummary {
     pub sections: Vec<SectionForce>,
     /// Stored energy `½ uᵀ K u`; a coupled model with an unsymmetric tangent has none in the strict sense.
     pub energy: Option<f64>,
-    /// What was shown about the model before it was solved.
+    /// Results of the checks of the model before it was solved.
     #[serde(skip_serializing_if = "Proof::is_empty")]
     pub proof: Proof,
-    /// What may be inaccurate.
+    /// Properties of the model or the solution that may make results inaccurate.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
     /// The largest rotation of a finite element, from 2 degrees on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotation: Option<Rotation>,
-    /// What became of a scene in time; none of a static one.
+    /// Results of a scene in time; none of a static one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionSummary>,
     /// Files written.
@@ -287,7 +287,7 @@ impl RunSummary {
         Ok(())
     }
 
-    /// How well a static solution meets equilibrium.
+    /// Writes the residual and the balance of forces of a static solution.
     fn write_balance(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,

@@ -52,7 +52,7 @@ impl Values {
         format!("type=\"{kind}\"{more}")
     }
 
-    /// Whether there is no value.
+    /// Returns true if there is no value.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -64,7 +64,7 @@ impl Values {
 /// xx yy zz xy yz xz, 9 tensor by rows).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field {
-    /// What ParaView lists.
+    /// Name that ParaView lists.
     pub name: String,
     /// Numbers per entry.
     pub components: usize,
@@ -142,7 +142,7 @@ impl Field {
     }
 }
 
-/// What one VTU file shows: points, cells, and fields over both.
+/// Content of one VTU file: points, cells, and fields over both.
 ///
 /// Shapes: cell `c` takes the next `shapes[c].node_count()` entries of `connectivity`, in VTK's node order.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,4 +1,4 @@
-//! What a run will need, counted from volumes: the answer where laying the model out would take longer than a check may.
+//! Resources of a run, counted from volumes: the estimate where laying the model out would take longer than a check may.
 
 use super::resource_estimate::Prediction;
 use crate::observe::proof::Proof;

@@ -103,7 +103,7 @@ impl Prediction {
         Ok(())
     }
 
-    /// How far results will be from those of a finer model, or why that is not known.
+    /// Writes the predicted difference of the results from those of a finer model, or the reason why it is not known.
     fn write_error(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(e) = &self.error {
             writeln!(

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// What a predicted error is measured against.
+/// Reference of a predicted error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ErrorReference {
@@ -27,15 +27,15 @@ impl std::fmt::Display for ErrorReference {
 /// An error, predicted from other runs of the scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ErrorPrediction {
-    /// What is compared.
+    /// Quantities that are compared.
     pub quantities: Vec<String>,
     /// The relative error.
     pub error: f64,
-    /// Against what.
+    /// Reference that it is measured against.
     pub against: ErrorReference,
     /// The measured error was within this factor in so many scenes as `share` says.
     pub spread: f64,
-    /// Of how many scenes that is true, see `docs/choosing.md`.
+    /// Share of the scenes for which that is true, see `docs/choosing.md`.
     pub share: &'static str,
     /// The order in the spacing that the pilots show.
     pub order: f64,

@@ -1,15 +1,15 @@
-//! What a run will need, without solving.
+//! Prediction of the resources of a run, without solving.
 //!
 //! | file | what |
 //! |---|---|
 //! | `resource_estimate.rs` | of a static scene: sizes, memory, time |
-//! | `solver_estimate.rs` | what solving with a stiffness takes |
+//! | `solver_estimate.rs` | cost of solving with a stiffness |
 //! | `motion_estimate.rs` | of one that moves |
 //! | `counted.rs` | the same from volumes, where the model is too large to be laid out |
-//! | `output_cost.rs` | what outputs will cost |
+//! | `output_cost.rs` | cost of the outputs |
 //! | `display.rs` | a prediction, as people read it |
 //! | `error_prediction.rs` | an error, predicted |
-//! | `processes.rs` | what each of several processes will have |
+//! | `processes.rs` | share of each of several processes |
 //! | `process_share.rs` | the same in numbers |
 //! | `process_memory.rs` | the memory of each |
 
@@ -34,7 +34,7 @@ use crate::run::chosen::with_choice;
 use crate::run::{AnyScene, RunError};
 use crate::scene::{Scene, Solve};
 
-/// What a run of a scene will need, without solving; counted from volumes where laying the model out would take too long, see [`Prediction::counted`].
+/// Predicts the resources of a run of a scene, without solving; counted from volumes where laying the model out would take too long, see [`Prediction::counted`].
 ///
 /// # Errors
 /// [`RunError`], each with place and remedy.
@@ -68,7 +68,7 @@ pub fn laid_out(scene: AnyScene, progress: &dyn Progress) -> Result<Prediction, 
     Ok(prediction)
 }
 
-/// What a run of a scene will need, once the model is laid out.
+/// Predicts the resources of a run of a scene, once the model is laid out.
 fn predicted<const D: usize>(
     scene: Scene<D>,
     progress: &dyn Progress,

@@ -1,4 +1,4 @@
-//! What a run in time will need: its stable step, number of steps, memory and time, from a few steps taken.
+//! Estimate of a run in time: its stable step, number of steps, memory and time, from a few steps taken.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -38,10 +38,10 @@ use crate::solve::FreeDofs;
 use crate::solve::explicit::{Explicit, ExplicitParams};
 use crate::solve::statics::MethodUsed;
 
-/// Steps are taken for a tenth of the run to tell what one costs, for this long at most \[s\].
+/// Steps are tried for a tenth of the run to measure the duration of one, for this long at most \[s\].
 const TRIED_FOR: f64 = 0.5;
 
-/// And for this long at least \[s\].
+/// Shortest time for which steps are tried \[s\].
 const LEAST_TRIED: f64 = 0.01;
 
 /// Steps before the clock starts.
@@ -131,7 +131,7 @@ fn prediction<const D: usize>(
     }
 }
 
-/// Whether a run writes VTU files.
+/// Presence of VTU files in the output of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Files {
     Some,
@@ -167,7 +167,7 @@ fn seconds_per_step(
 
 /// Seconds that output takes.
 struct OutputCost {
-    /// Of opening the history and its first row.
+    /// Seconds of opening the history and its first row.
     opened: f64,
     per_row: f64,
     per_file: f64,

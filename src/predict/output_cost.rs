@@ -1,4 +1,4 @@
-//! What the outputs of a run will cost, from a part of them written into a folder of its own.
+//! Cost of the outputs of a run, from a part of them written into a folder of its own.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -14,7 +14,7 @@ use crate::scene::spec::PointOutputSpec;
 /// Cells and points of the larger of two trial files, at least.
 const SHOWN: usize = 1500;
 
-/// And of the smaller one, which tells what a file costs however little it holds.
+/// The same of the smaller one, which gives the cost of a file however little it holds.
 const FEW: usize = 150;
 
 /// Of all files of a run together, the larger trial file may be this share.
@@ -38,7 +38,7 @@ impl TrialFolder {
         Self(parent.join(format!(".bondline-check-{}-{number}", std::process::id())))
     }
 
-    /// Where it is; whoever writes makes it.
+    /// Path of the folder; whoever writes makes it.
     pub fn path(&self) -> &Path {
         &self.0
     }

@@ -1,4 +1,4 @@
-//! What each of several processes will hold: what one process holds alone, less what others have of it, and what MPI and PETSc add.
+//! Memory of each of several processes: that of one process alone, less what others have of it, plus that of MPI and PETSc.
 
 use super::process_share::ProcessShare;
 use super::resource_estimate::Prediction;
@@ -27,7 +27,7 @@ const MUMPS: [f64; 2] = [1.5, 1.8];
 /// Vectors of GMRES, two for each iteration; most solves take fewer.
 const GMRES_VECTORS: usize = 100;
 
-/// How the work of a scene is spread over processes.
+/// Distribution of the work of a scene over processes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Spreading {
     /// Steps or load steps: every process holds what one does.
@@ -80,7 +80,7 @@ pub(super) fn divide(
     }
 }
 
-/// What PETSc has of the stiffness of a process, and solves with \[bytes\].
+/// Memory of PETSc for the stiffness of a process and its solver \[bytes\].
 fn in_petsc(share: &ProcessShare, spreading: Spreading, of_blocks: f64, alone: &Prediction) -> u64 {
     let several = usize::from(of_blocks < 1.0);
     let matrix = share.stiffness_bytes as f64;

@@ -1,8 +1,8 @@
-//! What one of several processes has of a scene, in numbers.
+//! Share of one of several processes in a scene, in numbers.
 
 use serde::Serialize;
 
-/// What one of several processes has.
+/// Share of one of several processes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ProcessShare {
     /// Sites whose rows it computes.
@@ -13,9 +13,9 @@ pub struct ProcessShare {
     pub blocks: usize,
     /// Bonds whose families it holds: those of all points, or of its own, and of these points' neighbours where a law asks for them.
     pub bonds: usize,
-    /// What its part of the stiffness takes in PETSc \[bytes\], or of the springs that precondition it where rows are shared, without factors or coarse levels; zero of a scene in time, which assembles none.
+    /// Memory of its part of the stiffness in PETSc \[bytes\], or of the springs that precondition it where rows are shared, without factors or coarse levels; zero of a scene in time, which assembles none.
     pub stiffness_bytes: u64,
-    /// What it receives for each product with the stiffness, or for each step in time \[bytes\]: the numbers of its ghosts, or of all sites that others have.
+    /// Data received for each product with the stiffness, or for each step in time \[bytes\]: the numbers of its ghosts, or of all sites that others have.
     pub received_bytes: u64,
     /// Most memory that it will hold \[bytes\].
     pub memory_bytes: u64,

@@ -1,4 +1,4 @@
-//! What each of several processes will have of a scene.
+//! Share of a scene that each of several processes will have.
 
 use rustc_hash::FxHashSet;
 
@@ -21,7 +21,7 @@ use crate::{assembly::Pattern, parallel};
 /// Bytes of a scalar of a sparse matrix in memory: its value and its column.
 const SCALAR: u64 = 12;
 
-/// What processes have of a scene, their memory aside.
+/// Shares of several processes in a scene, their memory aside.
 #[derive(Clone, Debug)]
 pub struct Processes {
     shares: Vec<ProcessShare>,
@@ -32,12 +32,12 @@ pub struct Processes {
 }
 
 impl Processes {
-    /// What each has, by their number; its memory is zero.
+    /// Share of each process, by its number; its memory is zero.
     pub fn shares(&self) -> &[ProcessShare] {
         &self.shares
     }
 
-    /// By what sites are distributed, and why.
+    /// Rule by which sites are distributed, and its reason.
     pub fn distribution(&self) -> &str {
         &self.distribution
     }
@@ -49,7 +49,7 @@ impl Processes {
     }
 }
 
-/// What `count` processes will have of a scene; `partitioner` is a process that can cut graphs, without which sites are distributed by bisection.
+/// Predicts the shares of `count` processes in a scene; `partitioner` is a process that can cut graphs, without which sites are distributed by bisection.
 ///
 /// # Errors
 /// [`RunError`] if the model cannot be built, as a run would.
@@ -148,12 +148,12 @@ fn shares<const D: usize>(
     })
 }
 
-/// Whether every site is a point.
+/// Returns true if every site is a point.
 fn are_points<const D: usize>(model: &Model<D>) -> bool {
     (0..model.sites.len()).all(|site| model.point_of(site).is_some())
 }
 
-/// What PETSc has of a static scene with linear forces.
+/// Distribution of a static scene with linear forces over processes: PETSc has its factors, products or rows.
 fn of_statics<const D: usize>(
     model: &Model<D>,
     coupling: &dyn Coupling<D>,
@@ -176,7 +176,7 @@ fn of_statics<const D: usize>(
     }
 }
 
-/// What a process has whose rows are those of its own sites, of a system that moves by them if there is one.
+/// Share of a process that has the rows of its own sites; `system` is the one that moves by them, if there is one.
 fn of_rows<const D: usize>(
     model: &Model<D>,
     partition: &Partition,

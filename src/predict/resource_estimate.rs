@@ -1,4 +1,4 @@
-//! What a run of a scene will need: sites, bonds, non-zeros, memory and time, without solving it.
+//! Prediction of the resources of a run: sites, bonds, non-zeros, memory and time, without solving the scene.
 //!
 //! The model is laid out as a run does it, so sites and bonds are exact, and what it occupies is read from the system.
 //! Each row of the stiffness is computed and dropped at once; only its pattern stays, from which ordering and symbolic
@@ -38,23 +38,23 @@ use crate::system::Symmetry;
 
 use super::process_share::ProcessShare;
 
-/// What a run will need.
+/// Predicted resources of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Prediction {
     /// The scene's name or title.
     pub scene: String,
-    /// Why the model was not laid out: sizes and memory are then counted from volumes, and nothing is proven; `run` proves.
+    /// Reason why the model was not laid out: sizes and memory are then counted from volumes, and nothing is proven; `run` proves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub counted: Option<String>,
     /// Space dimension.
     pub dimension: usize,
     /// Coupling method, as the scene names it.
     pub coupling: String,
-    /// How large the model is; exact.
+    /// Sizes of the model; exact unless `counted`.
     pub sizes: Sizes,
-    /// How it will be solved; none of a scene in time.
+    /// Solution method; none of a scene in time.
     pub method: Option<MethodUsed>,
-    /// Whether the stiffness is symmetric.
+    /// Symmetry of the stiffness.
     pub symmetry: Symmetry,
     /// Unknowns that no condition prescribes.
     pub unknowns: usize,
@@ -64,34 +64,34 @@ pub struct Prediction {
     pub operations: f64,
     /// Most memory that a run will hold \[bytes\].
     pub peak_memory_bytes: u64,
-    /// What holds memory; not all of it at the same time.
+    /// Items that hold memory; not all of them at the same time.
     pub memory: Vec<Share>,
-    /// What of the peak is there beside stiffness, solver and output \[bytes\].
+    /// Part of the peak beside stiffness, solver and output \[bytes\].
     #[serde(skip)]
     pub base_bytes: u64,
     /// Seconds per stage: up to the ordering measured here, of the others from parts of them that were tried here.
     pub timings: Timings,
     /// Seconds of all stages.
     pub total_seconds: f64,
-    /// What the scene asks for or leaves open.
+    /// Choices that the scene asks for or leaves open.
     pub choices: Vec<Decision>,
-    /// What was shown about the model before it was solved.
+    /// Results of the checks of the model before it is solved.
     #[serde(skip_serializing_if = "Proof::is_empty")]
     pub proof: Proof,
-    /// What will be costly or inaccurate.
+    /// Properties of the model that make a run costly or inaccurate.
     pub warnings: Vec<String>,
-    /// How far results will be from those of a finer model, where runs with other spacings tell; as `bondline check` finds out.
+    /// Predicted difference of the results from those of a finer model, where runs with other spacings tell; as `bondline check` finds out.
     pub error: Option<ErrorPrediction>,
-    /// Why there is none, if it was looked for.
+    /// Reason why there is none, if it was looked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub no_error: Option<String>,
     /// The steps of a scene in time; none of a static one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionPrediction>,
-    /// What each of several processes will have, if that was asked for.
+    /// Share of each of several processes, if that was asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub processes: Vec<ProcessShare>,
-    /// By what their sites are distributed, and why.
+    /// Rule by which their sites are distributed, and its reason.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub distribution: String,
 }
@@ -107,7 +107,7 @@ pub struct MotionPrediction {
     pub stable_step: f64,
     /// The step that row sums guarantee.
     pub certified_step: f64,
-    /// Where the row with the largest sum is.
+    /// Position of the row with the largest sum.
     pub certified_at: Vec<f64>,
     /// Seconds of a step, measured here.
     pub seconds_per_step: f64,
@@ -221,7 +221,7 @@ fn sizes_of<const D: usize>(
     }
 }
 
-/// What bond weights and volumes of points do.
+/// Decisions on bond weights and volumes of points.
 fn weights_decisions<const D: usize>(model: &Model<D>) -> Vec<Decision> {
     let mut choices = Vec::new();
     if let Some(p) = &model.peridynamics {
@@ -268,10 +268,10 @@ fn seconds_of_output<const D: usize>(
     Ok(output_seconds(&rest.output, &made_up)?)
 }
 
-/// What is shown of a model by its rows on affine fields.
+/// Returns the proof of a model by its rows on affine fields.
 ///
 /// # Errors
-/// [`RunError::Proof`] for a proof that refuses the model.
+/// [`RunError::Unproven`] for a proof that refuses the model.
 fn proved<const D: usize>(
     model: &Model<D>,
     coupling: &dyn Coupling<D>,
@@ -320,7 +320,7 @@ fn free_dofs<const D: usize>(
     Ok(FreeDofs::from_prescribed(&prescribed, D))
 }
 
-/// How the system is solved, and why not linearly where it is not.
+/// Decisions on the solver, with the reason why the system is not linear where it is not.
 fn solver_decisions<const D: usize>(
     model: &Model<D>,
     rest: &RunSettings<D>,
@@ -346,7 +346,7 @@ fn solver_decisions<const D: usize>(
 /// Bonds beyond which a scene deserves a second thought.
 const MANY_BONDS: usize = 100_000_000;
 
-/// What `check` warns of.
+/// Warnings of `check`.
 ///
 /// # Errors
 /// [`RunError`] for a fracture energy that gives no stretch.
@@ -423,7 +423,7 @@ fn shell_factors<const D: usize>(model: &Model<D>, horizon: f64) -> Option<(f64,
     Some((least, factors.iter().copied().fold(0.0, f64::max)))
 }
 
-/// What isotropic weights do for points that are no lattice: nothing, and by how much families then miss the typed constants.
+/// Effect of isotropic weights on points that are no lattice: none, and by how much families then miss the typed constants.
 fn scattered<const D: usize>(model: &Model<D>) -> String {
     let missed = model
         .tensor_deviation()

@@ -1,4 +1,4 @@
-//! What solving with a stiffness that is not assembled yet will take: method, factors, memory and time.
+//! Estimate of the solution with a stiffness that is not assembled yet: method, factors, memory and time.
 
 use std::time::Duration;
 
@@ -61,7 +61,7 @@ const HIERARCHY: f64 = 2.1;
 /// Bytes of program and buffers that a run touches after its model is laid out; measured.
 pub(crate) const PROGRAM: u64 = 3_700_000;
 
-/// How a stiffness that is not assembled yet will be solved with.
+/// Planned solution with a stiffness that is not assembled yet.
 pub(crate) struct Planned {
     pub analysis: Analysis,
     pub cost: FactorCost,
@@ -73,7 +73,7 @@ pub(crate) struct Planned {
 }
 
 impl Planned {
-    /// How the system on free dofs of a pattern will be solved.
+    /// Plans the solution of the system on free dofs of a pattern.
     ///
     /// # Errors
     /// [`RunError`] for a graph that cannot be ordered.
@@ -114,7 +114,7 @@ impl Planned {
         })
     }
 
-    /// What holds memory beside the `laid_out` bytes of the model, and the most that is held at the same time.
+    /// Returns the items that hold memory beside the `laid_out` bytes of the model, and the most that is held at the same time.
     pub fn memory<const D: usize>(
         &self,
         laid_out: u64,
@@ -149,7 +149,7 @@ impl Planned {
         (memory, peak)
     }
 
-    /// Whether the stiffness is factorised.
+    /// Returns true if the stiffness is factorised.
     fn is_factorised(&self) -> bool {
         matches!(self.method, MethodUsed::Cholesky | MethodUsed::Lu)
     }

@@ -1,4 +1,4 @@
-//! A scene whose zone is placed, of any dimension: what is run.
+//! A scene of any dimension whose zone is placed: the input of a run.
 
 use std::any::Any;
 use std::path::{Path, PathBuf};
@@ -114,7 +114,7 @@ impl AnyScene {
         Self::complete(source, directory, name)
     }
 
-    /// Keeps what was chosen for an accuracy, to be told with the results.
+    /// Keeps the choices made for an accuracy, to be reported with the results.
     pub fn chose(&mut self, choices: Vec<Decision>) {
         let known = match self {
             Self::Bar(s) => &mut s.choices,
@@ -169,7 +169,7 @@ impl AnyScene {
         }
     }
 
-    /// Whether the scene has a history, so that it can be interrupted and resumed.
+    /// Returns true if the scene runs in steps, so that it can be interrupted and resumed.
     pub fn moves(&self) -> bool {
         let solve = match self {
             Self::Bar(s) => &s.solve,

@@ -1,4 +1,4 @@
-//! Whether internal forces of a body in equilibrium sum to nothing, so that loads and reactions do.
+//! Balance of a body in equilibrium: its internal forces sum to zero, so that loads and reactions do.
 
 use crate::coupling::Model;
 use crate::tensor::Vector;

@@ -9,7 +9,7 @@ use crate::scene::Source;
 /// Spacing of the lattice \[m\].
 const SPACING: f64 = 0.01;
 
-/// What a block is of; lengths in spacings.
+/// Definition of a test block; lengths in spacings.
 pub struct Block<'a> {
     /// As a scene types it.
     pub coupling: &'a str,

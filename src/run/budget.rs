@@ -1,4 +1,4 @@
-//! The memory that a run may take, and what a scene needs of it, counted before anything is laid out.
+//! Memory that a run may take, and the needs of a scene, counted before anything is laid out.
 //!
 //! Points follow from the volume of the cells that hold them, bonds from points times the size of a family, the stiffness from the families that a row
 //! sees. None of this needs the points themselves, so a spacing that is ten times too small is refused in milliseconds instead of ending in an allocation
@@ -22,7 +22,7 @@ use serde::Serialize;
 /// A share of the memory of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Share {
-    /// What holds it.
+    /// Name of the item that holds it.
     pub name: &'static str,
     /// Bytes.
     pub bytes: u64,
@@ -74,7 +74,7 @@ fn control_group() -> Option<u64> {
     Some(most.saturating_sub(held.saturating_sub(files)))
 }
 
-/// What a scene needs, counted from volumes.
+/// Sizes of a scene, counted from volumes.
 ///
 /// Points within a hundredth where cells are larger than the spacing; bonds are those of whole families, so that near surfaces fewer exist.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -97,11 +97,11 @@ pub struct Counts {
     pub dofs: f64,
     /// Scalars of the assembled stiffness.
     pub nonzeros: f64,
-    /// Whether rows of points see the families of their neighbours too.
+    /// True if the rows of points couple to the families of their neighbours as well.
     is_state_based: bool,
-    /// Whether bonds are passed over in steps.
+    /// True if the run takes steps, each of which traverses the bonds.
     is_moving: bool,
-    /// Whether equal bonds share their weights.
+    /// True if equal bonds share their weights.
     is_lattice: bool,
 }
 
@@ -245,7 +245,7 @@ impl Counts {
         list
     }
 
-    /// What of them is there beside stiffness and solver.
+    /// Bytes without stiffness and solver.
     pub fn base(&self) -> u64 {
         let shares = self.memory().into_iter();
         let base = shares.filter(|s| !["stiffness", "solver"].contains(&s.name));
@@ -272,9 +272,9 @@ const PER_SEARCHED: f64 = 4.0;
 pub(crate) const PER_BOND: f64 = 12.0;
 /// Bytes more of a state-based bond: influence, and the way back from its end.
 pub(crate) const PER_STATE_BOND: f64 = 20.0;
-/// Bytes of a bond of a lattice that is passed over.
+/// Bytes of a bond of a lattice that steps traverse.
 const PER_LATTICE_PASS: f64 = 1.3;
-/// Bytes of a listed bond that is passed over.
+/// Bytes of a listed bond that steps traverse.
 const PER_LISTED_PASS: f64 = 11.4;
 /// Bytes of a scalar of the stiffness; equal rows are stored once.
 const PER_NONZERO: f64 = 2.0;
@@ -414,7 +414,7 @@ impl Counts {
     }
 }
 
-/// What would make the scene fit: a spacing, where points and bonds take most of it.
+/// Remedy by which the scene would fit: a spacing, where points and bonds take most of it.
 fn remedy<const D: usize>(scene: &Scene<D>, counts: &Counts, there: u64) -> String {
     let rest: f64 = PER_CELL * counts.cells as f64 + PER_NODE * counts.nodes as f64;
     let left = there as f64 - rest;
@@ -447,7 +447,7 @@ fn remedy<const D: usize>(scene: &Scene<D>, counts: &Counts, there: u64) -> Stri
 
 /// Seconds of one thread per bond that the search for families finds, measured on 6.5 million bonds in 2D with the other threads busy.
 const SEARCH: f64 = 4e-7;
-/// The same per bond of a body that moves: its passes, and the stable step from its rows.
+/// The same per bond of a body that moves: its traversals, and the stable step from its rows.
 const SET_UP: f64 = 2.5e-6;
 /// The same per scalar of the stiffness: computed, dropped, ordered.
 const PATTERN: f64 = 1.8e-7;

@@ -1,4 +1,4 @@
-//! What a run does when the coupling that was chosen for it does not hold: it goes on with the next one, and says so.
+//! Fallback of a run whose chosen coupling does not hold: it goes on with the next one, and says so.
 
 use crate::coupling::ModelError;
 use crate::run::error::RunError;
@@ -41,7 +41,7 @@ pub fn with_choice<const D: usize, T>(
 }
 
 impl RunError {
-    /// Whether another coupling might do: the seam refuses, or the proof does.
+    /// Returns true if another coupling might do: the seam refuses, or the proof does.
     pub(crate) fn is_of_coupling(&self) -> bool {
         matches!(
             self,

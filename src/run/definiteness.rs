@@ -1,4 +1,4 @@
-//! Whether a seam whose energy is no sum of squares is stable: its stiffness is factorised, and refused if that fails.
+//! Stability of a seam whose energy is no sum of squares: its stiffness is factorised, and refused if that fails.
 //!
 //! Truncated bonds of an LPS below the Poisson ratio of a pairwise law have dilatations of negative stiffness. Whole bonds outweigh them down to a bulk modulus of zero, pieces need not: the matrix at hand decides.
 
@@ -14,7 +14,7 @@ use crate::solve::ordering::Ordering;
 use crate::system::{Ranks, Symmetry};
 use crate::tensor::padded;
 
-/// What is added to the matrix, as a part of its diagonal: far above what round-off leaves of the motions of a free body (6e-13), and no mode that it hides grows by more than e² in 100 000 steps.
+/// Shift of the matrix, as a part of its diagonal: far above what round-off leaves of the rigid motions of a free body (6e-13), and no mode that it hides grows by more than e² in 100 000 steps.
 const SHIFT: f64 = 1e-10;
 
 /// Refuses a model that has negative eigenvalues; its matrix is looked at only if it may. Collective where families are spread over `ranks`.
@@ -60,7 +60,7 @@ pub(crate) fn check<const D: usize>(
     }
 }
 
-/// Why a matrix is not shown to have no negative eigenvalue.
+/// Reason why a matrix is not shown to be free of negative eigenvalues.
 pub(crate) enum Open {
     /// A pivot of a site is negative.
     Negative { site: usize },

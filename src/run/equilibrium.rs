@@ -39,11 +39,11 @@ pub(crate) struct StaticInput<'a, const D: usize> {
     pub time: f64,
     /// The processes that solve it together, if there are several.
     pub ranks: Option<&'a dyn Ranks>,
-    /// What expands by its temperature, if anything does.
+    /// Thermal expansion, if any material expands.
     pub thermal: Option<&'a Thermal<D>>,
 }
 
-/// What of a stiffness is there to be proved: all of it, or its products.
+/// Stiffness at hand for the proof: all rows, or those of one process.
 pub(crate) enum Assembled<'a> {
     /// All rows.
     Whole(&'a BlockCsr),
@@ -64,11 +64,11 @@ pub(crate) struct Equilibrium {
     pub solution: StaticSolution,
     /// Internal force \[N\] at the solution.
     pub internal: Vec<f64>,
-    /// What springs hold the body.
+    /// Springs that hold the body.
     pub terms: ConditionTerms,
     /// Energy stored there and in springs \[J\]; none of a matrix that is not symmetric.
     pub energy: Option<f64>,
-    /// What the symmetry of the matrix decided.
+    /// Decisions that followed from the symmetry of the matrix.
     pub choices: Vec<Decision>,
     pub timings: Timings,
 }
@@ -81,7 +81,7 @@ impl Equilibrium {
     }
 }
 
-/// Assembles, hands the stiffness to `prove`, which tells the seconds that it took, and solves; `system` is what has forces that are not linear, if they are not.
+/// Assembles, hands the stiffness to `prove`, which returns the seconds that it took, and solves; `system` is the one with nonlinear forces, if they are nonlinear.
 ///
 /// # Errors
 /// [`RunError`] for a condition that meets no site, and for a system without a solution.
@@ -212,14 +212,14 @@ fn spread_expansion<const D: usize>(
     Ok(Some(all))
 }
 
-/// Adds to a load what free expansion takes, if anything expands.
+/// Adds the forces of free expansion to a load, if anything expands.
 fn expand(load: &mut [f64], expands: Option<&[f64]>) {
     for (f, own) in load.iter_mut().zip(expands.unwrap_or_default()) {
         *f += own;
     }
 }
 
-/// What expansion takes belongs to the forces within the body, not to the load.
+/// Moves the forces of free expansion from the load to the internal forces, to which they belong.
 fn take_expansion(internal: &mut [f64], load: &mut [f64], expands: &[f64]) {
     for ((f, load), own) in internal.iter_mut().zip(load).zip(expands) {
         *f -= own;
@@ -403,7 +403,7 @@ fn nonlinear<const D: usize>(
     Ok((solution, internal, energy))
 }
 
-/// Why a static scene has no solution, which knows of no load steps.
+/// Converts the error of an incremental solution to that of a static scene, which knows of no load steps.
 fn without_steps(error: QuasiStaticError, positions: &[[f64; 3]]) -> RunError {
     match error {
         QuasiStaticError::NoEquilibrium {
@@ -428,13 +428,13 @@ fn without_steps(error: QuasiStaticError, positions: &[[f64; 3]]) -> RunError {
     }
 }
 
-/// Says that a body has points alone, whose condition is that of L/δ and not of L/h: conjugate gradients without a matrix then take less time and an eighth of the memory.
+/// Returns true if a body has points alone, whose condition is that of L/δ and not of L/h: conjugate gradients without a matrix then take less time and an eighth of the memory.
 fn has_points_alone<const D: usize>(model: &Model<D>, symmetry: Symmetry) -> bool {
     let is_point = |site: usize| model.point_of(site).is_some();
     symmetry == Symmetry::Symmetric && (0..model.sites.len()).all(is_point)
 }
 
-/// Says whether factors of the stiffness may lead Newton's method: not where `[solver]` asks for an iteration, nor, by `"auto"`, where there are points alone.
+/// Returns true if factors of the stiffness may precondition Newton's method: not where `[solver]` asks for an iteration, nor, by `"auto"`, where there are points alone.
 pub fn may_factorise<const D: usize>(model: &Model<D>, method: Method, symmetry: Symmetry) -> bool {
     match method {
         Method::Krylov => false,
@@ -443,12 +443,12 @@ pub fn may_factorise<const D: usize>(model: &Model<D>, method: Method, symmetry:
     }
 }
 
-/// Says whether multigrid of the stiffness leads Newton's method: where `[solver]` asks for an iteration, and there are not points alone.
+/// Returns true if multigrid of the stiffness preconditions Newton's method: where `[solver]` asks for an iteration, and there are not points alone.
 pub fn may_coarsen<const D: usize>(model: &Model<D>, method: Method, symmetry: Symmetry) -> bool {
     method == Method::Krylov && !has_points_alone(model, symmetry)
 }
 
-/// What the solver is asked for, with the memory that is left to it.
+/// Parameters of the linear solver, with the memory that is left to it.
 pub fn params(solver: &Solver) -> StaticParams {
     StaticParams {
         method: solver.method,

@@ -1,4 +1,4 @@
-//! Why a scene that is right could not be run.
+//! Errors of the run of a valid scene.
 
 use crate::coupling::semidiscrete::behaviour::SystemError;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use crate::solve::stable_step::StepError;
 use crate::solve::statics::StaticError;
 use crate::solve::sub_cycling::SubCyclingError;
 
-/// Why a scene that is right could not be run.
+/// Error of the run of a valid scene.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The model cannot be built.
@@ -43,7 +43,7 @@ pub enum RunError {
         "this model is unstable in time at any step: a mode largest at ({}) grows as exp({rate:.3e} t), by exp({gain:.1}) over the run (eigenvalue {real:.3e} + {imaginary:.3e} i of M⁻¹K, which should be real and positive); {remedy}; or let it begin with solve.explicit.growing-modes = \"warn\"", place.iter().map(|x| format!("{x:.4e}")).collect::<Vec<_>>().join(", ")
     )]
     Grows {
-        /// Where the mode is largest.
+        /// Position of the mode's largest amplitude.
         place: Vec<f64>,
         /// σ \[1/s\].
         rate: f64,
@@ -53,7 +53,7 @@ pub enum RunError {
         real: f64,
         /// Imaginary part.
         imaginary: f64,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// The stiffest sites cannot take sub-steps.
@@ -78,7 +78,7 @@ pub enum RunError {
         }
     )]
     Indefinite {
-        /// What was found.
+        /// The finding against the matrix.
         what: String,
         /// Poisson's ratio of the material.
         typed: f64,
@@ -92,11 +92,11 @@ pub enum RunError {
     NoCoupling {
         /// The coupling tried first.
         first: &'static str,
-        /// Why it does not hold.
+        /// Reason why it does not hold.
         reason: Box<RunError>,
         /// The coupling tried next.
         second: &'static str,
-        /// Why that does not hold either.
+        /// Reason why that does not hold either.
         error: Box<RunError>,
     },
     /// The state cannot be carried over to other zones.
@@ -105,17 +105,17 @@ pub enum RunError {
     /// A check of the model failed, so that no result of it can be trusted.
     #[error("{message}; or let it run with solver.unproven = \"warn\"")]
     Unproven {
-        /// What is wrong, by how much, and what to do.
+        /// The defect, its size and a remedy.
         message: String,
-        /// Where, one coordinate per dimension; empty where no single place is to blame.
+        /// Place, one coordinate per dimension; empty where no single place is to blame.
         place: Vec<f64>,
     },
     /// Something that is planned and not there yet.
     #[error("{what}: {remedy}")]
     Later {
-        /// What was asked for.
+        /// The feature that was asked for.
         what: &'static str,
-        /// What to do instead.
+        /// Alternative.
         remedy: &'static str,
     },
     /// A local law failed, and with it the motion.
@@ -124,11 +124,11 @@ pub enum RunError {
         format!("at ({}): ", x.join(", "))
     }))]
     Law {
-        /// What the law says.
+        /// Message of the law.
         failure: String,
         /// The site that the motion or the load step names.
         place: Option<Vec<f64>>,
-        /// How the failure ended the run.
+        /// Error with which the failure ended the run.
         source: Box<RunError>,
     },
     /// The scene needs more memory than there is.
@@ -136,15 +136,15 @@ pub enum RunError {
         "the scene needs about {needed} of memory, {there} are there: {largest} ({sizes}); {remedy}"
     )]
     Memory {
-        /// What it needs.
+        /// Memory that the scene needs.
         needed: String,
         /// The budget, [`memory_budget`](super::memory_budget).
         there: String,
         /// The three largest items.
         largest: String,
-        /// What was counted.
+        /// Counts from which it was estimated.
         sizes: String,
-        /// What to do.
+        /// Remedy.
         remedy: String,
     },
     /// A section with all sites of the model on one side.
@@ -156,7 +156,7 @@ pub enum RunError {
     EmptySection {
         /// Its name.
         section: String,
-        /// How many lie beyond.
+        /// Number of sites beyond it.
         sites: usize,
     },
     /// An impactor lies over the body at time zero.
@@ -166,9 +166,9 @@ pub enum RunError {
     Overlap {
         /// Its name.
         impactor: String,
-        /// How deep the body lies inside \[m\].
+        /// Depth by which the body lies inside the impactor \[m\].
         depth: f64,
-        /// Where it lies deepest.
+        /// Position of the greatest depth.
         place: Vec<f64>,
     },
     /// A condition meets no site.
@@ -176,13 +176,13 @@ pub enum RunError {
     Idle {
         /// Its name.
         condition: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
 }
 
 impl RunError {
-    /// Where it went wrong, if that is known: a position, the key of a condition, or a file.
+    /// Returns the place of the error, if that is known: a position, the key of a condition, or a file.
     pub fn place(&self) -> Option<String> {
         let at = |x: &[f64]| {
             let x: Vec<String> = x.iter().map(|x| format!("{x:.4e}")).collect();

@@ -1,4 +1,4 @@
-//! The model of a scene about rest: what studies of stiffness, eigenvalues and waves look at.
+//! The model of a scene linearised about rest, for studies of stiffness, eigenvalues and waves.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::tensor::padded;
 pub struct SceneModel<const D: usize> {
     /// Sites and families.
     pub model: Model<D>,
-    /// How the models are joined; its operator belongs to `model`.
+    /// Coupling of the models; its operator belongs to `model`.
     pub coupling: Box<dyn Coupling<D>>,
     /// Density of each material [kg/m³]; zero where the scene types none.
     pub density: Vec<f64>,

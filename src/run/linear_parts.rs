@@ -17,13 +17,13 @@ use crate::system::Ranks;
 use crate::tensor::{Tensor, Vector, inverse, padded, strain};
 use crate::{fem, parallel};
 
-/// Part of the stress that a law has to lose over a run before parts that do not are told.
+/// Part of the stress that a law has to lose over a run before a warning names the parts that do not.
 const LOST: f64 = 0.01;
 
 /// A limit counts as passed beyond it by more than what is rounded.
 const ROUNDED: f64 = 1e-9;
 
-/// How a run solves: what it lets break, and what places its zone.
+/// Kind of a run: it decides which bonds may break and what places the zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RunKind {
     /// One equilibrium, in which no bond breaks.
@@ -34,16 +34,16 @@ pub(crate) enum RunKind {
     Explicit,
 }
 
-/// What passed its limit furthest: part of a checkpoint.
+/// The element or point furthest beyond its limit: part of a checkpoint.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Passing {
     /// Its strain or stretch over the limit.
     factor: f64,
     place: [f64; 3],
-    /// How many were beyond theirs then.
+    /// Number of elements or points beyond their limits in that state.
     count: u64,
     material: u16,
-    /// Whether its limit is the stretch at which bonds break.
+    /// True if the limit is the stretch at which bonds break.
     breaks: bool,
     step: u64,
     time: f64,
@@ -60,13 +60,13 @@ pub(crate) struct Passed {
 /// A finite element that keeps to a linearisation, or cannot break.
 struct Element {
     cell: u32,
-    /// Whether its material has more than the linearisation that it follows.
+    /// True if its material is nonlinear where the element follows the linearisation.
     departs: bool,
     /// The stretch at which bonds of its material would break; infinite where none would.
     critical: f64,
 }
 
-/// What of a model is linear, or stays whole, whatever its material does.
+/// Parts of a model that are linear, or stay whole, whatever their material does.
 pub(crate) struct LinearParts<'m, const D: usize> {
     model: &'m Model<D>,
     rest: &'m RunSettings<D>,
@@ -156,7 +156,7 @@ impl<'m, const D: usize> LinearParts<'m, D> {
         }
     }
 
-    /// Whether a material ever does what its linearisation does not.
+    /// Returns true if a material ever departs from its linearisation.
     fn departs(&self, material: u16) -> bool {
         self.departure(material, &small_shear(), 0.0) != Departure::None
     }
@@ -342,7 +342,7 @@ impl<'m, const D: usize> LinearParts<'m, D> {
         format!("at ({}){when}", place.join(", "))
     }
 
-    /// What begins at a strain in a material, and what would let elements do it.
+    /// Returns the nonlinearity that begins at a strain in a material, and the key that lets elements follow it.
     fn beginning(&self, material: u16) -> (&'static str, Option<&'static str>) {
         match self.departure(material, &small_shear(), 0.0) {
             Departure::AtStrain {
@@ -415,7 +415,7 @@ impl<'m, const D: usize> LinearParts<'m, D> {
         )
     }
 
-    /// Whether a place lies where the scene lets nothing break.
+    /// Returns true if the place lies in a region in which the scene lets nothing break.
     fn is_held(&self, p: &Passing) -> bool {
         let x = Vector::<D>::from_column_slice(&p.place[..D]);
         let regions = &self.rest.breaking.no_fail;

@@ -1,4 +1,4 @@
-//! Conditions of a scene on the sites of its model: which sites are held, and what force each takes.
+//! Conditions of a scene on the sites of its model: the sites that are held, and the force on each.
 
 #![deny(clippy::wildcard_enum_match_arm)]
 
@@ -19,7 +19,7 @@ use crate::{
     parallel,
 };
 
-/// How far from a set a peridynamic point may lie, in its own spacings, to be held with the set in any case.
+/// Distance from a set, in its own spacings, up to which a peridynamic point is held with the set in any case.
 ///
 /// The first layer lies on the set or half a spacing away, at the corner of a square 0.71 of one; the second layer at least one. Where the first layer lies farther off, the points are held that the set's own places follow.
 const FIRST_LAYER: f64 = 0.75;
@@ -203,7 +203,7 @@ pub fn supports<const D: usize>(
     Ok((prescribed, holder))
 }
 
-/// Whether a component of a condition is a function of position: it is asked for many values at once.
+/// Returns true if a component of a condition is a function of position, which is evaluated for many values at once.
 pub(crate) fn is_function<const D: usize>(condition: &Condition<D>, axis: usize) -> bool {
     let component = condition.components.0[axis].as_ref();
     component.is_some_and(|e| e.function().is_some() && e.depends_on_position())
@@ -222,7 +222,7 @@ pub(crate) fn values_at_dofs<const D: usize>(
     components.values(axis, &places, t).unwrap_or_default()
 }
 
-/// What a load acts on; the force of any field follows from it without another search.
+/// Parts of a model on which a load acts; the force of any field follows from them without another search.
 #[derive(Clone, Debug)]
 struct LoadTarget<const D: usize> {
     condition: usize,
@@ -237,7 +237,7 @@ struct LoadTarget<const D: usize> {
     detail: Detail,
 }
 
-/// How a finite element shares a body force out among its nodes.
+/// Distribution of a body force over the nodes of a finite element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BodyForces {
     /// By its shape functions, as equilibrium asks for.
@@ -257,7 +257,7 @@ pub(crate) struct Loads<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Loads<'a, D> {
-    /// Finds what each load of `conditions` acts on.
+    /// Finds the parts of a model on which each load of `conditions` acts.
     ///
     /// # Errors
     /// [`RunError::Idle`] for a load that meets no site.

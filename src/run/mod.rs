@@ -2,14 +2,14 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `any_scene.rs`, `placed_scene.rs` | a scene of any dimension with its zone placed: what is run |
+//! | `any_scene.rs`, `placed_scene.rs` | a scene of any dimension with its zone placed: the input of a run |
 //! | `zone_placement/` | `zones = "auto"`: the nonlocal zone that a solution with elements alone asks for |
 //! | `setup.rs` | `Scene` to the problem that is coupled, and the settings that a run keeps |
-//! | `budget.rs` | the memory that a run may take, and the refusal of what needs more before anything is laid out |
+//! | `budget.rs` | the memory that a run may take, and the refusal of a scene that needs more before anything is laid out |
 //! | `chosen.rs` | the next coupling where the one that was chosen does not hold |
-//! | `definiteness.rs` | whether a seam that may be unstable is |
+//! | `definiteness.rs` | stability of a seam that may be unstable |
 //! | `loads.rs` | which sites conditions hold, and the force that each site takes |
-//! | `proof/` | what is shown about a model before it is solved |
+//! | `proof/` | checks of a model before it is solved |
 //! | `equilibrium.rs`, `solution.rs` | assembly, conditions and solution of a static system |
 //! | `statics.rs`, `motion/` | the sequence of a static run; scenes in time and load steps, checkpoints |
 //! | `results.rs` | a solution that a program keeps: fields and tables by name |
@@ -23,12 +23,12 @@
 //! | `thermal.rs` | the force on each site that a change of temperature gives |
 //! | `condition_terms.rs` | forces of conditions that depend on the displacement, on the sites of a model |
 //! | `sections.rs` | force and moment that the part of the body beyond a plane exerts on the rest |
-//! | `balance.rs`, `rotation.rs`, `surface_gradient.rs`, `warnings.rs` | whether loads and reactions balance; how far elements rotate; stresses that families do not resolve; what of a model makes its results doubtful |
+//! | `balance.rs`, `rotation.rs`, `surface_gradient.rs`, `warnings.rs` | balance of loads and reactions; rotation of elements; stresses that families do not resolve; properties of a model that make its results doubtful |
 //! | `linear_parts.rs` | elements, rows and bonds that are linear, or stay whole, beyond where their material is |
 //! | `write.rs` | the files of a run |
-//! | `pieces.rs`, `point_cells.rs` | what a process writes into its piece of a VTU file; the cells shown around points |
-//! | `error.rs` | what cannot be run, with place and remedy |
-//! | `block.rs`, `observed_tests.rs` | a block from a scene, for unit tests; what an observer sees |
+//! | `pieces.rs`, `point_cells.rs` | the piece of a VTU file that a process writes; the cells shown around points |
+//! | `error.rs` | errors of a run, with place and remedy |
+//! | `block.rs`, `observed_tests.rs` | a block from a scene, for unit tests; tests of the data that an observer receives |
 
 mod any_scene;
 mod balance;

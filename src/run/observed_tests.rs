@@ -1,4 +1,4 @@
-//! What an observer sees of a run, against the files of the same run.
+//! Tests of the data that an observer receives from a run, against the files of the same run.
 
 use std::path::Path;
 use std::sync::Mutex;

@@ -1,4 +1,4 @@
-//! What of a model each of several processes shows in its piece of a VTU file, and the numbers of it in the file that one process writes.
+//! Piece of a model that each of several processes writes to its VTU file, and the numbers of its entities in the file that one process writes.
 
 use super::loads::site_of_node;
 use super::point_cells::PointCells;
@@ -8,7 +8,7 @@ use crate::scene::spec::PointOutputSpec;
 use crate::system::{Partition, Ranks};
 use crate::tensor::{Vector, padded};
 
-/// The number of what another process shows.
+/// Number of an entity that another process shows.
 const OTHERS: u32 = u32::MAX;
 
 /// The elements and peridynamic points that one process shows.

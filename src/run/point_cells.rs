@@ -22,14 +22,14 @@ const CORNERS: [[f64; 3]; 8] = [
     [-1.0, 1.0, 1.0],
 ];
 
-/// Where the cells of a model's points come from.
+/// Source of the cells of a model's points.
 pub(super) struct PointCells<'a, const D: usize> {
     model: &'a Model<D>,
     /// The cell of the mesh by its centroid, where points lie at centroids.
     cell_at: Option<FxHashMap<[u64; D], u32>>,
 }
 
-/// What a position is found by.
+/// Returns the key by which a position is found.
 fn key<const D: usize>(x: &Vector<D>) -> [u64; D] {
     std::array::from_fn(|i| x[i].to_bits())
 }

@@ -24,9 +24,9 @@ pub struct Frame(Snapshot);
 pub struct NoSuchField {
     /// Field, table or column.
     pub kind: &'static str,
-    /// What was asked for.
+    /// Name that was asked for.
     pub name: String,
-    /// What is there.
+    /// Names that exist.
     pub known: String,
 }
 
@@ -153,7 +153,7 @@ impl Table {
     }
 }
 
-/// What a run gives: its solutions, tables and summary.
+/// Results of a run: its solutions, tables and summary.
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// All but the last.
@@ -256,7 +256,7 @@ impl AnyScene {
     }
 }
 
-/// Why a scene that a program made gave no solution.
+/// Error of a scene that a program made and that gave no solution.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
     /// The scene is wrong.

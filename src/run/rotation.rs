@@ -1,4 +1,4 @@
-//! Rotation of finite elements and bonds that are linear, and what it costs.
+//! Rotation of finite elements and bonds that are linear, and the error that it causes.
 //!
 //! A linear element that rotates by θ without strain has the strain `(cos θ − 1) I` in the plane of the rotation. Where all of a body is linear, it is free to grow by `1/cos θ − 1` instead, and its
 //! lengths are wrong by as much. Where exact bonds keep their lengths in a zone, the elements around it want to be larger than the zone by `e = 1/cos θ − 1`, and both strain each other: a misfit.
@@ -17,16 +17,16 @@ use crate::run::setup::RunSettings;
 use crate::system::Ranks;
 use crate::tensor::{Tensor, Vector, padded};
 
-/// Rotation in degrees from which on it is told.
+/// Rotation in degrees from which on it is reported.
 pub(crate) const TOLD: f64 = 2.0;
 
-/// Misfit, over the stretch at which bonds fail, from which on a smaller rotation is told as well.
+/// Misfit, over the stretch at which bonds fail, from which on a smaller rotation is reported as well.
 const TOLD_OF_FAILURE: f64 = 0.1;
 
 /// Points whose rotation is measured, at most: all of a small body, and every so manyth of a large one, which a look would cost as much as a step.
 const POINTS: usize = 2000;
 
-/// What is linear in a model, to measure its rotation.
+/// Linear elements and points of a model, to measure their rotation.
 pub(crate) struct Rotations<'m, const D: usize> {
     model: &'m Model<D>,
     cells: Vec<u32>,
@@ -157,7 +157,7 @@ impl<'m, const D: usize> Rotations<'m, D> {
         (self.model).of_families(self.ranks, &self.points, 1, angles)
     }
 
-    /// What a summary tells, from [`TOLD`] or [`TOLD_OF_FAILURE`] on; `scale` is the largest energy of the run, `when` a step with its time.
+    /// Returns the entry of the summary, from [`TOLD`] or [`TOLD_OF_FAILURE`] on; `scale` is the largest energy of the run, `when` a step with its time.
     pub fn told(
         &self,
         degrees: f64,
@@ -181,7 +181,7 @@ impl<'m, const D: usize> Rotations<'m, D> {
     }
 }
 
-/// What lets the elements and points that are linear rotate.
+/// Returns the keys of a scene that let its linear elements and points rotate.
 fn remedy<const D: usize>(
     model: &Model<D>,
     rest: &RunSettings<D>,

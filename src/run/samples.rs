@@ -22,7 +22,7 @@ pub struct Samples {
     pub displacement: Vec<Option<[f64; 3]>>,
 }
 
-/// At most so many places are taken of the sites of a model; of more sites, every so many.
+/// Largest number of places that are taken of the sites of a model; of more sites, every so manyth.
 const MOST: usize = 20_000;
 
 impl AnyScene {

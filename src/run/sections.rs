@@ -77,7 +77,7 @@ impl<const D: usize> Resultant<D> {
     }
 }
 
-/// A place of a quadrature over what a load acts on.
+/// A point of a quadrature over the domain of a load.
 struct LoadPoint<const D: usize> {
     place: Vector<D>,
     weight: f64,
@@ -86,11 +86,11 @@ struct LoadPoint<const D: usize> {
     follows: Vec<(u32, f64)>,
 }
 
-/// What lies beyond a section of a model.
+/// Part of a model beyond a section.
 struct Cut<const D: usize> {
     about: Vector<D>,
     sites: Vec<(u32, Vector<D>)>,
-    /// Dofs that count on the other side than their site, with the sign of what they change.
+    /// Dofs that count on the other side of the section than their site, with the sign of the change.
     moved: Vec<(usize, Vector<D>, f64)>,
     loads: Vec<LoadBeyond<D>>,
 }
@@ -116,7 +116,7 @@ enum Share<const D: usize> {
     Everywhere(Vec<LoadPoint<D>>),
 }
 
-/// The sections of a scene, and what of its model lies beyond each.
+/// The sections of a scene, and the part of its model beyond each.
 pub(crate) struct Sections<'a, const D: usize> {
     sections: &'a [Section<D>],
     conditions: &'a [Condition<D>],
@@ -153,7 +153,7 @@ pub(crate) fn header<const D: usize>(sections: &[Section<D>]) -> Vec<String> {
 }
 
 impl<'a, const D: usize> Sections<'a, D> {
-    /// Finds what of a model lies beyond each section.
+    /// Finds the part of a model beyond each section.
     ///
     /// # Errors
     /// [`RunError::EmptySection`] for one beyond which no site lies.
@@ -274,7 +274,7 @@ impl<'a, const D: usize> Sections<'a, D> {
     }
 }
 
-/// What a set holds lies where the set does: points that a support holds from beside it may lie on the other side of a plane than the support.
+/// Returns the dofs that count on the side of the set that holds them: points that a support holds from beside it may lie on the other side of a plane than the support.
 ///
 /// # Errors
 /// As [`holders`].
@@ -349,7 +349,7 @@ fn load_beyond<const D: usize>(
     })
 }
 
-/// The quadrature over what a load acts on beyond a section.
+/// The quadrature over the domain of a load beyond a section.
 fn points_beyond<const D: usize>(
     model: &Model<D>,
     section: &Section<D>,

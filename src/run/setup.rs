@@ -32,27 +32,27 @@ fn horizon_field<const D: usize>(horizon: Expression) -> HorizonField<D> {
     }
 }
 
-/// What of a scene remains once its problem is built.
+/// Settings of a scene that remain once its problem is built.
 pub struct RunSettings<const D: usize> {
     /// Supports and loads.
     pub conditions: Vec<Condition<D>>,
-    /// How systems of equations are solved.
+    /// Solver of the systems of equations.
     pub solver: Solver,
-    /// What is written, and where.
+    /// Output: quantities and files.
     pub output: Output<D>,
     /// Displacements and velocities at the start.
     pub initial: Vec<Initial<D>>,
     /// Rigid bodies that strike or press.
     pub impactors: Vec<Impactor<D>>,
-    /// What breaks bonds.
+    /// Failure of bonds.
     pub breaking: Breaking<D>,
     /// Poisson's ratio of the points.
     pub ratio: Ratio,
-    /// How the nonlocal zone follows damage, where it does.
+    /// Rule by which the nonlocal zone follows damage, where it does.
     pub follow: Option<Follow>,
     /// A number for all that determines the results.
     pub fingerprint: Fingerprint,
-    /// What elements of the points' materials follow.
+    /// Model that elements of the points' materials follow.
     pub elements: ElementsSpec,
     /// The local law of each material's elements, of those whose elements are not linear by their material.
     pub local_laws: Vec<Option<Arc<dyn LocalLaw<D>>>>,
@@ -60,13 +60,13 @@ pub struct RunSettings<const D: usize> {
     pub materials: Vec<Material<D>>,
     /// Density of each material.
     pub density: Vec<f64>,
-    /// What expands, and what of the stress is written.
+    /// Thermal expansion, and the stresses that are written.
     pub stresses: StressSettings<D>,
     /// The coupling, where the scene names none.
     pub chosen: Option<Decision>,
-    /// How the zone was placed, where the scene draws none.
+    /// Placement of the zone, where the scene draws none.
     pub placed: Option<Decision>,
-    /// What was chosen for the accuracy that the scene wants.
+    /// Choices made for the accuracy that the scene wants.
     pub choices: Vec<Decision>,
 }
 
@@ -93,12 +93,12 @@ pub(crate) fn same_everywhere<const D: usize>(
 }
 
 impl<const D: usize> RunSettings<D> {
-    /// What was chosen for the accuracy, the zone and the coupling, in this order.
+    /// Returns the choices for the accuracy, the zone and the coupling, in this order.
     pub fn made(&self) -> impl Iterator<Item = &Decision> {
         self.choices.iter().chain(&self.placed).chain(&self.chosen)
     }
 
-    /// Whether elements of the model follow a law that is not linear.
+    /// Returns true if elements of the model follow a law that is not linear.
     pub fn has_nonlinear_elements(&self, model: &Model<D>) -> bool {
         let laws = model.local_laws(&self.local_laws);
         let bends = |c: usize| laws[model.material_of_cell(c) as usize].is_some();
@@ -106,13 +106,13 @@ impl<const D: usize> RunSettings<D> {
             && (0..model.mesh.cell_count()).any(|c| model.is_element(c) && bends(c))
     }
 
-    /// Whether the element of a cell follows a law for strains and rotations of any size.
+    /// Returns true if the element of a cell follows a law for strains and rotations of any size.
     pub fn is_objective(&self, model: &Model<D>, cell: usize) -> bool {
         let law = model.local_law(&self.local_laws, model.material_of_cell(cell));
         law.is_some_and(|law| law.is_objective())
     }
 
-    /// Whether the forces at a point are for small rotations: of bonds linear in the displacement, or of a local law for small strains.
+    /// Returns true if the forces at a point are for small rotations: of bonds linear in the displacement, or of a local law for small strains.
     pub fn has_linear_point(&self, model: &Model<D>, point: usize) -> bool {
         match model.local_law_at(point) {
             Some(law) => !law.is_objective(),
@@ -120,7 +120,7 @@ impl<const D: usize> RunSettings<D> {
         }
     }
 
-    /// What makes the forces of bonds that are intact, or of elements, depend on the displacement otherwise than linearly, as a choice; none where they do not.
+    /// Returns as a choice the reason why the forces of intact bonds, or of elements, depend nonlinearly on the displacement; none where they are linear.
     pub fn nonlinear(&self, model: &Model<D>) -> Option<Decision> {
         let body = model
             .peridynamics
@@ -147,7 +147,7 @@ impl<const D: usize> RunSettings<D> {
         })
     }
 
-    /// How bonds deform.
+    /// Kinematics of the bonds.
     pub fn kinematics(&self) -> BondKinematics {
         match self.breaking.bonds {
             BondsSpec::Exact => BondKinematics::Exact,
@@ -269,7 +269,7 @@ pub(crate) fn shared_model<const D: usize>(
     Ok((model, coupling))
 }
 
-/// What is worth knowing of a model before it is solved: partial volumes, points on a border of materials, sizes of elements beside the points.
+/// Properties of a model worth knowing before it is solved: partial volumes, points on a border of materials, sizes of elements beside the points.
 pub fn model_choices<const D: usize>(model: &Model<D>) -> Vec<Decision> {
     let all = [
         volumes_choice(model),

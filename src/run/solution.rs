@@ -26,15 +26,15 @@ pub struct Solved<'a, const D: usize> {
     pub displacement: &'a [f64],
     /// Residual `K u − f` of each dof; on prescribed dofs the reaction.
     pub residual: &'a [f64],
-    /// Which zone each site lies in.
+    /// Zone of each site.
     pub zone_of_site: &'a [Zone],
-    /// What has forces that are not linear, or moves; none of a linear static scene.
+    /// The system with nonlinear forces or motion; none of a linear static scene.
     pub system: Option<&'a dyn SemiDiscrete>,
     /// Motion and damage.
     pub moved: Moved<'a>,
     /// Forces in the sections that the scene asks for.
     pub sections: &'a [SectionForce],
-    /// What of the stress is thermal and what is made of it, and the time.
+    /// Settings of the stresses, and the time.
     pub stresses: (&'a StressSettings<D>, f64),
 }
 

@@ -53,7 +53,7 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
         }
     }
 
-    /// Whether a position lies in the mesh and in no void.
+    /// Returns true if a position lies in the mesh and in no void.
     fn is_inside(&self, x: &Vector<D>) -> bool {
         let model = self.solved.model;
         let in_void = model.peridynamics.as_ref().is_some_and(|p| {

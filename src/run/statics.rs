@@ -67,7 +67,7 @@ pub fn solve_with<const D: usize>(
     dimension::of::<Solver<D>>(&SOLVERS)(scene.into(), None, progress, &mut visit)
 }
 
-/// What becomes of a solution; returns the files that it wrote.
+/// Consumer of a solution; returns the files that it wrote.
 type Visit<'a, const D: usize> =
     &'a mut dyn FnMut(&Output<D>, &Solved<'_, D>) -> Result<Vec<PathBuf>, ObserveError>;
 
@@ -99,7 +99,7 @@ fn solve_over<const D: usize>(
     })
 }
 
-/// Lays out, proves, solves and tells of a static scene whose mesh and zones are known.
+/// Lays out, proves, solves and summarises a static scene whose mesh and zones are known.
 fn solve_chosen<const D: usize>(
     scene: Scene<D>,
     kept: Option<Arc<CachedSolution<D>>>,
@@ -202,15 +202,15 @@ struct StaticBody<'a, const D: usize> {
     operator: &'a dyn Operator<D>,
     rest: &'a RunSettings<D>,
     ranks: Option<&'a dyn Ranks>,
-    /// Whether bonds of the seam turn like others.
+    /// True if bonds of the seam are geometrically exact like others.
     has_exact_seam: bool,
 }
 
 impl<const D: usize> StaticBody<'_, D> {
-    /// Proves what a stiffness shows before it is solved with; the proof, and its seconds.
+    /// Proves a model by its stiffness before it is solved; returns the proof, and its seconds.
     ///
     /// # Errors
-    /// [`RunError::Proof`] for one that refuses the model.
+    /// [`RunError::Unproven`] for a proof that refuses the model.
     fn prove(
         &self,
         assembled: &Assembled<'_>,
@@ -292,7 +292,7 @@ impl<const D: usize> StaticBody<'_, D> {
         Ok((solved, proof))
     }
 
-    /// What was decided about the solution.
+    /// Decisions made for the solution.
     fn decisions(&self, equilibrium: &Equilibrium) -> Vec<Decision> {
         let info = &equilibrium.solution.info;
         let mut choices = equilibrium.choices.clone();
@@ -309,7 +309,7 @@ impl<const D: usize> StaticBody<'_, D> {
         choices
     }
 
-    /// What the summary says of the solution: forces, energy, rotation, warnings.
+    /// Summary of the solution: forces, energy, rotation, warnings.
     ///
     /// # Errors
     /// [`RunError::Fracture`] for a fracture energy that gives no stretch.
@@ -370,7 +370,7 @@ impl<const D: usize> StaticBody<'_, D> {
         })
     }
 
-    /// What is known of forces that do not balance; with a solution by elements alone where they are told of.
+    /// Returns the imbalance of forces; with the difference from a solution by elements alone where the imbalance is warned of.
     fn imbalance<'b>(&self, balance: &'b Balance<D>, u: &[f64]) -> Imbalance<'b> {
         let known = Imbalance {
             force: balance.force.as_slice(),
@@ -386,7 +386,7 @@ impl<const D: usize> StaticBody<'_, D> {
         }
     }
 
-    /// What is linear beyond where its material is, or stays whole where it would break.
+    /// Warnings of parts that are linear beyond the linear range of their material, or stay whole where it would break.
     ///
     /// # Errors
     /// [`RunError::Fracture`] for a fracture energy that gives no stretch.

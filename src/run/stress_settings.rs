@@ -1,4 +1,4 @@
-//! What of a scene's stresses is thermal, and which numbers made of them are written.
+//! Thermal part of a scene's stresses, and the numbers made of stresses that are written.
 
 use std::sync::Arc;
 
@@ -9,16 +9,16 @@ use crate::scene::materials::{Material, Ratio};
 use crate::scene::spec::BondsSpec;
 use crate::scene::validated::{FieldChoice, Scene};
 
-/// What of a scene's stresses is thermal, and what is made of them.
+/// Thermal part of a scene's stresses, and the quantities that are made of stresses.
 #[derive(Clone, Debug)]
 pub struct StressSettings<const D: usize> {
     /// The fields that are asked for.
     pub output: FieldChoice,
-    /// What expands, if anything does.
+    /// Thermal expansion, if any material expands.
     pub thermal: Option<Thermal<D>>,
-    /// How the body stands for a solid.
+    /// Reduction of the solid: plane stress, plane strain or another.
     pub kinematics: Kinematics,
-    /// How bonds follow the motion.
+    /// Kinematics of the bonds.
     pub bonds: BondKinematics,
     /// The local law of each material's elements, of those whose elements are not linear by their material.
     pub local_laws: Vec<Option<Arc<dyn LocalLaw<D>>>>,
@@ -65,7 +65,7 @@ impl<const D: usize> StressSettings<D> {
         }
     }
 
-    /// Whether stresses of points are more than the bonds that a process has of its own: numbers are made of them, or a temperature has a part in them.
+    /// Returns true if stresses of points need more than the bonds that a process has of its own: numbers are made of them, or a temperature has a part in them.
     pub fn asks_for_more(&self) -> bool {
         self.thermal.is_some() || self.output.has_numbers()
     }

@@ -181,7 +181,7 @@ impl<const D: usize> Solved<'_, D> {
         }
     }
 
-    /// Whether stresses of points or of elements turn with the body.
+    /// Returns true if stresses of points or of elements turn with the body.
     pub(super) fn has_cauchy_stresses(&self) -> bool {
         let model = self.model;
         let mut materials = 0..self.stresses.0.constants.len() as u16;
@@ -190,12 +190,12 @@ impl<const D: usize> Solved<'_, D> {
         elements || points
     }
 
-    /// Whether bonds are geometrically exact.
+    /// Returns true if bonds are geometrically exact.
     fn has_exact_bonds(&self) -> bool {
         self.stresses.0.bonds == BondKinematics::Exact
     }
 
-    /// Whether elements of a material follow a law for strains and rotations of any size.
+    /// Returns true if elements of a material follow a law for strains and rotations of any size.
     fn is_objective(&self, material: u16) -> bool {
         let law = (self.model).local_law(&self.stresses.0.local_laws, material);
         law.is_some_and(|law| law.is_objective())

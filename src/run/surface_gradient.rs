@@ -12,16 +12,16 @@ use crate::{
 
 use super::stresses::{principal, von_mises};
 
-/// The share of the largest stress that families may miss before it is told: that of a bent beam whose depth is ten horizons.
+/// The share of the largest stress that families may miss without a warning: that of a bent beam whose depth is ten horizons.
 const MISSED: f64 = 0.08;
 
 /// Distance of a family's centroid from its point, over the horizon, from which the point is taken to lie at a surface; 0.42 at a plane one of a plate, 3/8 of a solid.
 const ONE_SIDED: f64 = 0.2;
 
-/// The part by which the stress of an element falls within a horizon from which on it is told beside a seam. Of a plate with a hole of 2.7 horizons whose elements are one layer thick the peak is 8 to 15 % too large, and falls by more than a third.
+/// The part by which the stress of an element falls within a horizon from which on a warning is given beside a seam. Of a plate with a hole of 2.7 horizons whose elements are one layer thick the peak is 8 to 15 % too large, and falls by more than a third.
 const STEEP: f64 = 0.3;
 
-/// What is asked of the stresses of a displacement.
+/// Data for the check of the stresses of a displacement.
 pub(super) struct Asked<'a> {
     pub kinematics: Kinematics,
     /// The displacement of the sites \[m\].
@@ -105,11 +105,11 @@ fn size<const D: usize>(asked: &Asked<'_>, tensor: &Tensor4<D>, gradient: &Tenso
     von_mises(&principal(&stress, across))
 }
 
-/// Tells of the largest stress of points where it lies at a free surface and changes within a family, by more than the part `uniform` of itself by which a uniform stress is wrong there: less may be the law's own surface effect.
+/// Warns of the largest stress of points where it lies at a free surface and changes within a family, by more than the part `uniform` of itself by which a uniform stress is wrong there: less may be the law's own surface effect.
 ///
-/// What a family knows of a deformation is its mean, that at its centroid, for fields that are linear over it. At a free surface the centroid lies inside by 0.42 of a horizon in plates and 3/8 in solids, so that a stress that falls off into the body,
+/// The deformation that a family measures is a mean, that at its centroid, for fields that are linear over it. At a free surface the centroid lies inside by 0.42 of a horizon in plates and 3/8 in solids, so that a stress that falls off into the body,
 /// as beside a hole or in bending, is wrong by its gradient times that distance, too low by correspondence; by an LPS, which strains more at surfaces, it may be too high. The gradient of the points is one of means, too, so that this is a lower bound: Kirsch's peak at a hole whose radius
-/// is 3.3 horizons is 24 % above that of points by correspondence, of which 10 to 11 % are told (`tests/loads/stresses.rs`). Cracks are left out: their stress has no bound that a mesh could resolve.
+/// is 3.3 horizons is 24 % above that of points by correspondence, of which 10 to 11 % are reported (`tests/loads/stresses.rs`). Cracks are left out: their stress has no bound that a mesh could resolve.
 ///
 /// Collective where families are spread over processes.
 fn missed_peak<const D: usize>(
@@ -154,7 +154,7 @@ fn missed_peak<const D: usize>(
     })
 }
 
-/// Tells of the largest stress of a model where it lies in an element within a horizon of points and falls off by more than [`STEEP`] within a horizon of it: rows of a seam balance a uniform stress, and no closer bound is known of one that is as steep.
+/// Warns of the largest stress of a model where it lies in an element within a horizon of points and falls off by more than [`STEEP`] within a horizon of it: rows of a seam balance a uniform stress, and no closer bound is known of one that is as steep.
 fn peak_at_seam<const D: usize>(
     model: &Model<D>,
     asked: &Asked<'_>,
@@ -209,7 +209,7 @@ fn stress_across<const D: usize>(
     }
 }
 
-/// Whether a point lies within a horizon of a crack.
+/// Returns true if a point lies within a horizon of a crack.
 fn near_crack<const D: usize>(model: &Model<D>, p: usize) -> bool {
     let (Some(body), Some(peridynamics)) = (model.body(), &model.peridynamics) else {
         return false;

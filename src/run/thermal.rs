@@ -1,4 +1,4 @@
-//! Thermal strain: what a temperature that differs from the one without stress does to the sites of a model.
+//! Thermal strain: effect on the sites of a model of a temperature that differs from the stress-free one.
 //!
 //! A body whose temperature is linear in space expands without stress by a displacement that is quadratic: with the rise τ and its gradient g at a place, `u = α (τ r + (g·r) r − ½ g |r|²)`, r from there. Its strain is `α (τ + g·r)` in
 //! all directions. Source: [BoleyWeiner1960], the strain being compatible where the temperature is linear.
@@ -76,7 +76,7 @@ impl<const D: usize> Thermal<D> {
         }
     }
 
-    /// By how much each node of a cell is displaced where the cell expands freely about its centroid; one that follows the ends of its edge, by the mean of theirs.
+    /// Displacement of each node of a cell that expands freely about its centroid; of a node that follows the ends of its edge, the mean of theirs.
     fn expanded_nodes(&self, model: &Model<D>, c: usize, t: f64) -> Vec<Vector<D>> {
         let mesh = &model.mesh;
         let alpha = self.expansion[model.material_of_cell(c) as usize];
@@ -120,7 +120,7 @@ impl<const D: usize> Thermal<D> {
         }
     }
 
-    /// What of each of the [`unit_expansions`] the free expansion around `x` is made of; rigid motions are left out.
+    /// Coefficients of the free expansion around `x` in the [`unit_expansions`]; rigid motions are left out.
     pub fn parts(&self, material: u16, x: &Vector<D>, t: f64) -> Vec<f64> {
         let alpha = self.expansion[usize::from(material)];
         let rise = self.rise(x, t);

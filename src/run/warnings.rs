@@ -1,4 +1,4 @@
-//! What of a model makes its results doubtful, and is told by `check` and by `run`.
+//! Warnings of `check` and `run`: properties of a model that make its results doubtful.
 
 use std::sync::Arc;
 
@@ -63,7 +63,7 @@ pub(crate) fn without_response(system: &dyn SemiDiscrete, u: &[f64]) -> Option<S
     })
 }
 
-/// The out-of-balance force, relative to the sum of all nodal loads and reactions, from which on it is told.
+/// The out-of-balance force, relative to the sum of all nodal loads and reactions, from which on it is warned of.
 ///
 /// A fixed body carries what is applied, so that a reaction that differs from the load is an error of every stress on the way. Rows of couplings by force
 /// are exact under affine fields and out of balance under others. Measured on plates of an LPS with a splice, horizon 3 spacings: 0.033 with a zone a third
@@ -71,21 +71,21 @@ pub(crate) fn without_response(system: &dyn SemiDiscrete, u: &[f64]) -> Option<S
 /// displacements 1.2 to 3 %.
 const OUT_OF_BALANCE: f64 = 0.002;
 
-/// What is known of forces that do not balance.
+/// Imbalance of the forces of a solution.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Imbalance<'a> {
     /// Their sum \[N\], by axis.
     pub force: &'a [f64],
     /// Its size over that of all loads and reactions.
     pub relative: f64,
-    /// By how much displacements differ from those of elements alone, over the largest of these; none where that was not computed.
+    /// Difference of displacements from those of elements alone, over the largest of these; none where that was not computed.
     pub difference: Option<f64>,
-    /// Whether the body expands under a temperature.
+    /// True if the body expands under a temperature.
     pub expands: bool,
 }
 
 impl Imbalance<'_> {
-    /// Whether it is large enough to be told.
+    /// Returns true if it is large enough for a warning.
     pub fn is_told(&self) -> bool {
         self.relative > OUT_OF_BALANCE
     }
@@ -224,7 +224,7 @@ fn nearly_incompressible<const D: usize>(
     })
 }
 
-/// What partial stress does where its elements meet the surface of the body: measured in `docs/bars.md`.
+/// Warns of elements with a partial stress at the surface of the body: measured in `docs/bars.md`.
 fn one_sided<const D: usize>(model: &Model<D>) -> Option<String> {
     if D == 1 || !model.roles.contains(&CellRole::StressElement) {
         return None;

@@ -126,7 +126,7 @@ fn replaced_by_pieces(
     Ok(files.list())
 }
 
-/// Which cells and points a file shows.
+/// Selection of cells and points that a file shows.
 #[derive(Clone, Copy, Debug)]
 pub enum Shown<'a> {
     /// All.

@@ -1,4 +1,4 @@
-//! A nonlocal zone that follows the crack: what the scene says of it.
+//! A nonlocal zone that follows the crack: its settings, and the scenes that cannot have it.
 
 use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
@@ -26,25 +26,25 @@ const PADDING: f64 = 5.0;
 /// Paddings that it reaches ahead of the tips of cracks, if the scene leaves that out: fewer changes, and points take the place of elements before the waves of the tip are there.
 const AHEAD: f64 = 1.5;
 
-/// Fraction of the critical stretch from which a cell is wanted, if the scene leaves it out: from 0.5 on waves of the branching plate mark most of it at the end.
+/// Fraction of the critical stretch from which a cell is wanted in the zone, if the scene leaves it out: from 0.5 on waves of the branching plate mark most of it at the end.
 const STRETCH: f64 = 0.8;
 
-/// How the nonlocal zone of a scene in time follows the crack.
+/// Settings of a nonlocal zone that follows the crack, in a scene in time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Follow {
-    /// Fraction of the critical stretch from which a cell is wanted.
+    /// Fraction of the critical stretch from which a cell is wanted in the zone.
     pub stretch: f64,
-    /// How far the zone reaches beyond such cells when it changes \[m\].
+    /// Distance by which the zone extends beyond such cells when it changes \[m\].
     pub padding: f64,
-    /// How far it reaches ahead of the tips of cracks when it changes \[m\].
+    /// Distance by which it extends ahead of the tips of cracks when it changes \[m\].
     pub ahead: f64,
-    /// How far it reaches beyond damage, cracks and voids, at all times \[m\].
+    /// Distance by which it extends beyond damage, cracks and voids, at all times \[m\].
     pub reach: f64,
     /// Cells that stay elements whatever happens, one entry per cell.
     pub barred: Vec<bool>,
 }
 
-/// Refuses scenes whose zone cannot follow the crack; the peridynamic side and its law of one whose zone can.
+/// Refuses scenes whose zone cannot follow the crack; returns the peridynamic side and its law of one whose zone can.
 fn supported<'a, const D: usize>(
     span: Span,
     selected: &mut SelectedCoupling,
@@ -118,7 +118,7 @@ fn supported<'a, const D: usize>(
     Ok((p, law))
 }
 
-/// How the zone follows, if the scene wants it to.
+/// Returns the settings of a zone that follows the crack, if the scene has one.
 pub(crate) fn follow<const D: usize>(
     spec: &SceneSpec,
     selected: &mut SelectedCoupling,

@@ -1,4 +1,4 @@
-//! Whether parts of a scene that are right alone agree: materials with zones, horizons with spacings.
+//! Agreement of parts of a scene that are right alone: materials with zones, horizons with spacings.
 
 use super::error::{SceneError, SceneErrorKind};
 use super::materials::Material;
@@ -183,7 +183,7 @@ pub(crate) fn crack_bands<const D: usize>(
     Ok(())
 }
 
-/// The materials that are used and remember, by their points or by their elements.
+/// Returns the first material in use whose law has a history, at its points or in its elements.
 fn remembering<'a, const D: usize>(
     materials: &'a [Material<D>],
     cell_material: &[u16],
@@ -208,7 +208,7 @@ fn remembering<'a, const D: usize>(
     used.find(remembers).map(|(_, m)| &materials[*m as usize])
 }
 
-/// Refuses a material that remembers where there is no time, or where zones are laid out anew.
+/// Refuses a material with a history in static scenes, and where zones are laid out anew.
 pub(crate) fn memory<const D: usize>(
     spec: &SceneSpec,
     materials: &[Material<D>],

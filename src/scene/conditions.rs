@@ -41,7 +41,7 @@ impl<const D: usize> PartialEq for Field<D> {
     }
 }
 
-/// What is prescribed.
+/// Quantity that a condition prescribes.
 #[derive(Clone, Debug)]
 pub enum Prescribed<const D: usize> {
     /// Displacement.
@@ -152,7 +152,7 @@ impl<const D: usize> Condition<D> {
         })
     }
 
-    /// Whether the force of a load differs from place to place.
+    /// Returns true if the force of a load differs from place to place.
     pub fn varies_in_space(&self) -> bool {
         let on_surface = |load: &Load<D>| matches!(load.on, Domain::Surface(_));
         self.load().is_some_and(on_surface) || self.components.depends_on_position()
@@ -173,8 +173,8 @@ impl<const D: usize> Condition<D> {
 pub struct Condition<const D: usize> {
     /// Its name.
     pub name: String,
-    /// What and where.
+    /// The prescribed quantity and its place.
     pub prescribed: Prescribed<D>,
-    /// How much.
+    /// Its components.
     pub components: Components<D>,
 }

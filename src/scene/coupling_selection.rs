@@ -20,10 +20,10 @@ use crate::mesh::Mesh;
 use crate::scene::points::Points;
 use crate::tensor::Vector;
 
-/// How exactly, in spacings, faces have to follow the lattice.
+/// Distance, in spacings, by which faces may deviate from the lattice.
 const FOLLOWS: f64 = 1e-6;
 
-/// What keeps `truncated` from a scene that names no coupling.
+/// Obstacle to `truncated` in a scene that names no coupling.
 enum Obstacle {
     /// It cannot hold.
     Certain(String),
@@ -34,7 +34,7 @@ enum Obstacle {
 /// The coupling that the scene names; without a name `truncated` where it is exact, or else `splice`. One model alone where a zone that was placed holds no cell, or every one.
 ///
 /// # Errors
-/// Those of the zones and of the lattice, which the choice looks at.
+/// Those of the zones and of the lattice, on which the choice depends.
 pub(crate) fn selected<const D: usize>(
     spec: &SceneSpec,
     (found, cell_material): (&[Material<D>], &[u16]),
@@ -125,7 +125,7 @@ fn without_peridynamics(spec: &SceneSpec) -> Result<(), SceneError> {
     ))
 }
 
-/// What keeps truncated bonds from being exact, if anything does.
+/// Returns the obstacle that keeps truncated bonds from being exact, if there is one.
 fn obstacle<const D: usize>(
     spec: &SceneSpec,
     p: &PeridynamicsSpec,
@@ -185,7 +185,7 @@ fn obstacle<const D: usize>(
         .then(|| Obstacle::Possible("the faces of the zone do not follow the lattice".to_owned())))
 }
 
-/// Whether the faces of the zone are planes of the lattice, or halfway between them, and their nodes too.
+/// Returns true if the faces of the zone are planes of the lattice, or halfway between them, and their nodes too.
 fn follows<const D: usize>(
     mesh: &Mesh<D>,
     zones: &[Zone],

@@ -1,7 +1,7 @@
-//! How large the horizon is if a scene does not say: three spacings of the points.
+//! Default of the horizon: three spacings of the points.
 //!
-//! Where no bond breaks the horizon is numerical: with it the solution tends to that of elasticity. Three points to a horizon are what most of the literature takes, and what a lattice
-//! takes here under a horizon that is typed. Where bonds break the horizon is a length of the material, and has to be typed.
+//! If no bond breaks, the horizon is a numerical parameter: with it the solution tends to that of elasticity. Three points to a horizon are what most of the literature takes, and what a lattice
+//! takes here under a horizon that is typed. If bonds break, the horizon is a length of the material, and has to be typed.
 
 use super::default_points::{RATIO, of_cells};
 use super::expression::Expression;
@@ -9,7 +9,7 @@ use super::spec::{PeridynamicsSpec, PointsSpec};
 use crate::coupling::Zone;
 use crate::mesh::Mesh;
 
-/// The horizon \[m\], and why it is so large if it is not typed; a lattice that is not typed suits the cells that are not local, or all if there are none.
+/// The horizon \[m\], and the reason for it if it is not typed; a lattice that is not typed suits the cells that are not local, or all if there are none.
 pub(crate) fn horizon_of<const D: usize>(
     spec: &PeridynamicsSpec,
     mesh: &Mesh<D>,

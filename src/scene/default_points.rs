@@ -1,4 +1,4 @@
-//! Where points lie if a scene does not say: a lattice, whatever the mesh is.
+//! Default positions of the points: a lattice, whatever the mesh is.
 //!
 //! Points at the centroids of cells have families as irregular as the cells. On triangles of different sizes bonds then carry neither the typed constants
 //! nor a uniform stress, so they are for those who ask for them. A lattice carries both on every mesh.
@@ -17,7 +17,7 @@ use crate::tensor::Vector;
 /// Spacings in a horizon, where nothing else decides.
 pub const RATIO: f64 = 3.0;
 
-/// How far, in cells, nodes may be from a lattice of cells.
+/// Distance, in cells, by which nodes may deviate from a lattice of cells.
 const ALIKE: f64 = 1e-6;
 
 /// A lattice for cells of the edge `cell` under a horizon: the cells themselves, or a whole fraction of them.
@@ -25,7 +25,7 @@ pub fn fraction_of_cells(cell: f64, horizon: f64) -> f64 {
     cell / (RATIO * cell / horizon).round().max(1.0)
 }
 
-/// The lattice of a scene that does not place its points, and why it is that one.
+/// The lattice of a scene that does not place its points, and the reason for it.
 ///
 /// `horizon` gives that of each cell \[m\].
 pub(crate) fn default_points<const D: usize>(

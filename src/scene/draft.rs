@@ -1,4 +1,4 @@
-//! From what was typed to a scene: each part read by its own file, the parts beside each other looked at here.
+//! Validation of a scene as typed: each part is read by its own file, the parts are checked against each other here.
 //!
 //! A scene may leave the nonlocal zone to the program (`zones = "auto"`), which takes solutions to find: what is validated without it is a [`Draft`], and whoever knows the
 //! zone makes the scene.
@@ -316,13 +316,13 @@ impl<'a, const D: usize> Draft<'a, D> {
     }
 }
 
-/// What points are made of.
+/// Materials and law of the points.
 struct PointMaterials<const D: usize> {
     /// Their materials.
     used: Vec<u16>,
     law: Arc<dyn Law<D>>,
     interfaces: Vec<MaterialInterface>,
-    /// Which they are, if there are several.
+    /// The decision that names them, if there are several.
     told: Option<Decision>,
 }
 

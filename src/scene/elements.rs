@@ -1,4 +1,4 @@
-//! What the finite elements of the points' materials follow, and whether the rest of the scene agrees.
+//! Constitutive law of the finite elements of the points' materials, and its agreement with the rest of the scene.
 
 use super::error::{SceneError, SceneErrorKind};
 use super::materials::Material;
@@ -8,7 +8,7 @@ use super::spec::{
 use crate::coupling::Zone;
 use crate::peridynamics::Law;
 
-/// What is typed of elements; those that follow the bonds need a coupling that carries their stress, and one lattice of bonds without memory.
+/// Returns the typed law of the elements; those that follow the bonds need a coupling that carries their stress, and one lattice of bonds without memory.
 ///
 /// # Errors
 /// A [`SceneError`] with the reason and the remedy.
@@ -40,7 +40,7 @@ pub(crate) fn elements<const D: usize>(
 /// A reason and its remedy.
 type Obstacle = Option<(String, &'static str)>;
 
-/// What keeps a coupling from carrying the stress of elements that follow the bonds.
+/// Returns the obstacle that keeps a coupling from carrying the stress of elements that follow the bonds.
 fn coupling_without_stress<const D: usize>(coupling: &CouplingSpec, law: &dyn Law<D>) -> Obstacle {
     let traits = coupling.traits();
     match (traits.zones, coupling) {
@@ -68,7 +68,7 @@ fn coupling_without_stress<const D: usize>(coupling: &CouplingSpec, law: &dyn La
     }
 }
 
-/// What keeps a law from giving elements a stress of its bonds.
+/// Returns the obstacle that keeps a law from giving elements a stress of its bonds.
 fn law_without_stress<const D: usize>(
     (materials, used): (&[Material<D>], &[u16]),
     law: &dyn Law<D>,
@@ -101,7 +101,7 @@ fn law_without_stress<const D: usize>(
     })
 }
 
-/// What keeps points from having one family in common.
+/// Returns the obstacle that keeps points from having one family in common.
 fn families_that_differ(spec: &SceneSpec) -> Obstacle {
     if !spec.zones.bodies.is_empty() {
         return Some((
@@ -122,7 +122,7 @@ fn families_that_differ(spec: &SceneSpec) -> Obstacle {
     Some((why.to_owned(), help))
 }
 
-/// Whether bonds that end on faces rotate with the body; if not, why.
+/// Tests that bonds that end on faces rotate with the body; the error says why they do not.
 fn truncated_bonds<const D: usize>(
     cut_bonds: Option<CutBondsSpec>,
     law: &dyn Law<D>,

@@ -1,11 +1,11 @@
-//! What is wrong with a scene: place, value and remedy.
+//! Error of a scene: place, value and remedy.
 
 use std::fmt;
 
 /// A range of bytes of the text of a scene, its overrides after it.
 pub type Span = std::ops::Range<usize>;
 
-/// What sort of mistake a [`SceneError`] reports.
+/// Kind of mistake that a [`SceneError`] reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum SceneErrorKind {
     /// The text is no TOML.
@@ -36,7 +36,7 @@ pub enum SceneErrorKind {
     Later,
 }
 
-/// A mistake in a scene, with where it stands and what to write instead.
+/// A mistake in a scene, with its place and its remedy.
 ///
 /// `Display` gives all on one line, `file:line: message; help`. [`SceneError::excerpt`] has what a terminal underlines.
 #[derive(Clone, Debug)]
@@ -48,7 +48,7 @@ pub struct SceneError {
     shown: Option<Box<Excerpt>>,
 }
 
-/// A piece of a scene's text, with what is wrong in it.
+/// A piece of a scene's text, with the mistake in it.
 #[derive(Clone, Debug)]
 pub struct Excerpt {
     /// The path of the scene, or `--set`; of a scene that a program made its name and the key at fault.
@@ -96,7 +96,7 @@ impl SceneError {
         self
     }
 
-    /// What sort of mistake it is.
+    /// Returns the kind of mistake.
     pub fn kind(&self) -> SceneErrorKind {
         self.kind
     }
@@ -165,7 +165,7 @@ pub(crate) fn closest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) 
         .map(|(_, k)| k)
 }
 
-/// How many letters differ, two that changed places counted once, ignoring case and taking `_` for `-`.
+/// Returns the edit distance of two words, two letters that changed places counted once, ignoring case and taking `_` for `-`.
 fn edits(a: &str, b: &str) -> usize {
     let plain = |s: &str| s.to_lowercase().replace('_', "-");
     strsim::osa_distance(&plain(a), &plain(b))

@@ -33,7 +33,7 @@ const TIME: usize = 3;
 pub struct Expression {
     /// The expression as typed.
     pub text: String,
-    /// Where it stands in the scene.
+    /// Span in the text of the scene.
     pub span: Span,
     root: Term,
     /// The tables that it may name.
@@ -52,7 +52,7 @@ impl fmt::Display for Expression {
     }
 }
 
-/// What is wrong with the text of an expression.
+/// Error in the text of an expression.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("in the expression `{text}`, character {at}: {what}")]
 pub struct ExpressionError {
@@ -60,7 +60,7 @@ pub struct ExpressionError {
     pub text: String,
     /// The character where reading stopped, counted from one.
     pub at: usize,
-    /// What was found, and what to write instead.
+    /// Description of the mistake, and what to write instead.
     pub what: String,
 }
 
@@ -117,7 +117,7 @@ const BINARY: &[(&str, Binary)] = &[
     ("min", f64::min),
 ];
 
-/// Whether a name is that of a variable, a constant or a function.
+/// Returns true if a name is that of a variable, a constant or a function.
 pub(crate) fn knows(name: &str) -> bool {
     let is_variable = matches!(name, "x" | "y" | "z" | "t" | "pi" | "if");
     is_variable || UNARY.iter().any(|(n, _)| *n == name) || BINARY.iter().any(|(n, _)| *n == name)
@@ -230,17 +230,17 @@ impl Expression {
             .then(|| self.eval(&[0.0; 3]))
     }
 
-    /// Whether the time `t` appears.
+    /// Returns true if the time `t` appears.
     pub fn depends_on_time(&self) -> bool {
         self.depends_on(TIME)
     }
 
-    /// Whether a coordinate appears.
+    /// Returns true if a coordinate appears.
     pub fn depends_on_position(&self) -> bool {
         (0..TIME).any(|axis| self.depends_on(axis))
     }
 
-    /// Whether the variable of `axis` (0 for `x`, 1 for `y`, 2 for `z`, 3 for `t`) appears.
+    /// Returns true if the variable of `axis` (0 for `x`, 1 for `y`, 2 for `z`, 3 for `t`) appears.
     pub fn depends_on(&self, axis: usize) -> bool {
         self.root.depends_on(axis)
     }

@@ -1,4 +1,4 @@
-//! How the bonds of a validated scene deform, where they may break, and what points do that touch.
+//! Deformation and fracture of the bonds of a validated scene, and contact of its points.
 
 use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
@@ -10,40 +10,40 @@ use super::spec::{
 };
 use crate::mesh::Mesh;
 
-/// How bonds deform and break. A scene that names neither fracture nor contact has none, and pays for none.
+/// Deformation and fracture of bonds, and contact. A scene that names neither fracture nor contact has none, and pays for none.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Breaking<const D: usize> {
-    /// How the force of a bond depends on the displacement.
+    /// Dependence of the bond force on the displacement.
     pub bonds: BondsSpec,
-    /// How the weights of bonds are kept in motion.
+    /// Storage of the weights of bonds in scenes in time and load steps.
     pub precision: PrecisionSpec,
-    /// When bonds of the peridynamic material break; never if there is none.
+    /// Fracture criterion of the peridynamic material, or else of an interface, if there is one.
     pub fracture: Option<Fracture>,
-    /// When bonds of each material break, and between materials, where points have several.
+    /// Fracture criteria of each material and of the interfaces, where points have several materials.
     pub several: Option<FractureOfMaterials>,
-    /// How the critical stretch follows from a fracture energy.
+    /// Calibration of the critical stretch to a fracture energy.
     pub calibration: CalibrationSpec,
-    /// Whether the law of the peridynamic material damages its bonds.
+    /// True if the law of the peridynamic material damages its bonds.
     pub damages: bool,
     /// Regions in which no bond breaks.
     pub no_fail: Vec<Region<D>>,
-    /// What is done when damage reaches the edge of the nonlocal zone.
+    /// Action when damage reaches the edge of the nonlocal zone.
     pub at_edge: EdgeSpec,
     /// Short-range contact.
     pub contact: Option<Contact>,
 }
 
 impl<const D: usize> Breaking<D> {
-    /// Whether bonds may break, at a stretch or by their damage.
+    /// Returns true if bonds may break, by a fracture criterion or by their damage.
     pub fn breaks(&self) -> bool {
         self.fracture.is_some() || self.damages
     }
 }
 
-/// When bonds break in a body of several materials.
+/// Fracture criteria of a body of several materials.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FractureOfMaterials {
-    /// Name of each material of the scene, and when its bonds break; never if there is none.
+    /// Name of each material of the scene, and its fracture criterion, if it has one.
     pub of: Vec<(String, Option<Fracture>)>,
     /// The numbers of those that points have.
     pub used: Vec<u16>,
@@ -60,7 +60,7 @@ pub struct Contact {
     pub stiffness_factor: f64,
 }
 
-/// Refuses what is said of broken bonds where none breaks.
+/// Refuses keys about broken bonds where no bond breaks.
 fn refuse_needless<const D: usize>(
     spec: &SceneSpec,
     material: &Material<D>,
@@ -100,7 +100,7 @@ fn refuse_needless<const D: usize>(
     Ok(())
 }
 
-/// How the force of a bond depends on the displacement.
+/// Returns the dependence of the bond force on the displacement.
 fn bonds_of<const D: usize>(
     spec: &SceneSpec,
     material: &Material<D>,
@@ -136,7 +136,7 @@ fn bonds_of<const D: usize>(
     })
 }
 
-/// The material by which questions about breaking bonds are answered, and what breaks bonds of it or of an interface: of several the first that breaks.
+/// Returns the material that decides on fracture, and the fracture criterion of it or of an interface: of several materials the first that breaks.
 fn material_that_breaks<'a, const D: usize>(
     materials: &'a [Material<D>],
     used: &[u16],
@@ -154,7 +154,7 @@ fn material_that_breaks<'a, const D: usize>(
     (material, fracture)
 }
 
-/// How bonds of the points deform and break, whose materials are those that are `used`.
+/// Returns the deformation and fracture of the bonds of points whose materials are those that are `used`.
 pub(crate) fn breaking<const D: usize>(
     spec: &SceneSpec,
     materials: &[Material<D>],

@@ -13,7 +13,7 @@ use std::sync::Arc;
 #[derive(Clone)]
 pub struct Function {
     evaluate: Arc<Evaluate>,
-    /// Whether values change in space, and in time.
+    /// True if values change: in space, and in time.
     varies: [bool; 2],
 }
 
@@ -85,17 +85,17 @@ impl Function {
         values
     }
 
-    /// What stands in a scene's keys for the function of this number among those of its source, see [`Source::with_functions`](super::Source::with_functions).
+    /// Returns the word that stands in a scene's keys for the function of this number among those of its source, see [`Source::with_functions`](super::Source::with_functions).
     pub fn word(number: usize) -> String {
         format!("function {number}")
     }
 
-    /// Whether values change in space.
+    /// Returns true if values change in space.
     pub fn depends_on_position(&self) -> bool {
         self.varies[0]
     }
 
-    /// Whether values change in time.
+    /// Returns true if values change in time.
     pub fn depends_on_time(&self) -> bool {
         self.varies[1]
     }

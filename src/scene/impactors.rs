@@ -19,13 +19,13 @@ pub struct Impactor<const D: usize> {
     pub name: String,
     /// Its shape, where it was typed.
     pub shape: ImpactorShape<D>,
-    /// How it moves.
+    /// Its motion.
     pub motion: ImpactorMotion<D>,
     /// Factor of its penalty stiffness.
     pub stiffness_factor: f64,
 }
 
-/// How an impactor moves; it never turns.
+/// Motion of an impactor; it never rotates.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ImpactorMotion<const D: usize> {
     /// As a free body.
@@ -236,7 +236,7 @@ fn shape<const D: usize>(
     }
 }
 
-/// How an impactor moves.
+/// Reads the motion of an impactor.
 fn motion<const D: usize>(
     place: &str,
     name: &Text,

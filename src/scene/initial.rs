@@ -1,4 +1,4 @@
-//! What a validated scene starts from.
+//! Initial fields of a validated scene.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use super::spec::{InitialFieldSpec, InitialSpec, ShapeSpec};
 use super::value::Text;
 use crate::mesh::Mesh;
 
-/// Which field is given at time zero.
+/// Field that is given at time zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InitialKind {
     /// Displacement.
@@ -25,11 +25,11 @@ pub enum InitialKind {
 pub struct Initial<const D: usize> {
     /// Its name.
     pub name: String,
-    /// Which field.
+    /// The field.
     pub kind: InitialKind,
-    /// Where.
+    /// Region of the field.
     pub region: Region<D>,
-    /// How much; components left out stay as they are.
+    /// Its components; those left out stay as they are.
     pub components: Components<D>,
 }
 

@@ -24,7 +24,7 @@ pub struct MaterialInterface {
     pub between: [u16; 2],
     /// The stiffness of its bonds.
     pub mean: StiffnessMean,
-    /// When they break; at the smaller critical stretch of the two materials if there is none.
+    /// The fracture criterion of its bonds; the smaller critical stretch of the two materials if there is none.
     pub fracture: Option<Fracture>,
 }
 

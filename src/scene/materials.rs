@@ -53,13 +53,13 @@ pub struct Material<const D: usize> {
     pub lame: (f64, f64),
     /// Density [kg/m³]; zero if not given.
     pub density: f64,
-    /// When its bonds break; never if there is none.
+    /// Fracture criterion of its bonds, if there is one.
     pub fracture: Option<Fracture>,
     /// Linear thermal expansion per degree; none if not given.
     pub expansion: Option<f64>,
 }
 
-/// When a bond breaks.
+/// Fracture criterion of a bond.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fracture {
     /// At the stretch at which a new crack takes this energy per area \[J/m²\].
@@ -71,7 +71,7 @@ pub enum Fracture {
 }
 
 impl Fracture {
-    /// Whether a stretch breaks the bond, typed or calibrated to an energy.
+    /// Returns true if a stretch breaks the bond, typed or calibrated to an energy.
     pub fn is_of_stretch(self) -> bool {
         match self {
             Self::Energy(_) | Self::Stretch(_) => true,
@@ -81,7 +81,7 @@ impl Fracture {
 }
 
 impl<const D: usize> Material<D> {
-    /// Whether its bonds may break, at a stretch or by their damage.
+    /// Returns true if its bonds may break, by a fracture criterion or by their damage.
     pub fn breaks(&self) -> bool {
         self.fracture.is_some() || self.law.damages()
     }

@@ -1,4 +1,4 @@
-//! What a scene writes: lines, probes, tips of cracks.
+//! Output of a scene: lines, probes, sections, tips of cracks.
 
 use toml::Spanned;
 

@@ -51,7 +51,7 @@ impl Place {
         self.path.join(".")
     }
 
-    /// What to write instead of something of another type.
+    /// Returns the remedy for a value of another type.
     fn belongs_here(&self, expected: &str, found: &str) -> String {
         match (self.dotted().as_str(), found) {
             ("mesh.file", _) => "write mesh.file.path = \"part.msh\"".to_owned(),
@@ -142,7 +142,7 @@ fn translate(error: &toml::de::Error, places: &DeTable<'_>) -> SceneError {
         .help("see `bondline schema` for what belongs here")
 }
 
-/// What to say of a key that must be there.
+/// Returns message and remedy for a missing key.
 fn missing(key: &str, at: &str) -> (String, String) {
     let place = if at.is_empty() {
         "the scene".to_owned()

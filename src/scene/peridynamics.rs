@@ -23,17 +23,17 @@ use crate::tensor::{Vector, padded};
 pub struct Peridynamics<const D: usize> {
     /// Horizon δ as a field.
     pub horizon: Expression,
-    /// Why it is so large, if the scene does not say how large.
+    /// Reason for its size, if the scene does not type it.
     pub horizon_why: Option<String>,
-    /// Where the points are.
+    /// Positions of the points.
     pub points: Points<D>,
-    /// Why they are there, if the scene does not say where.
+    /// Reason for their positions, as far as the scene does not type them.
     pub points_why: Option<String>,
     /// Bond weights.
     pub weights: WeightsSpec,
     /// Shares of the cells that the horizon cuts.
     pub volumes: PartialVolume,
-    /// Whether the mesh's boundary cuts bonds.
+    /// Treatment of bonds across the boundary of the mesh.
     pub surfaces: SurfacesSpec,
 }
 
@@ -63,7 +63,7 @@ pub(crate) fn influence(place: &str, spec: &InfluenceSpec) -> Result<Influence, 
     })
 }
 
-/// What `[peridynamics]` says; a lattice starts at a corner of the mesh, or half a spacing inside. `zones` are what a lattice that is not typed is laid out for.
+/// Reads `[peridynamics]`; a lattice starts at a corner of the mesh, or half a spacing inside. A lattice that is not typed is laid out for `zones`.
 pub(crate) fn peridynamics<const D: usize>(
     spec: &PeridynamicsSpec,
     start: LatticeStart,

@@ -1,9 +1,9 @@
-//! Where the points of a scene lie.
+//! Positions of the points of a scene.
 
 use crate::coupling::Lattice;
 use crate::tensor::Vector;
 
-/// Where the peridynamic points are.
+/// Positions of the peridynamic points.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Points<const D: usize> {
     /// At the centroids of cells.

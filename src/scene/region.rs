@@ -15,7 +15,7 @@ pub enum Region<const D: usize> {
     Shape {
         /// The shape.
         shape: Shape<D>,
-        /// How far around it.
+        /// Distance by which the shape is extended.
         margin: f64,
     },
     /// Cells of a named set.
@@ -113,7 +113,7 @@ impl<const D: usize> Region<D> {
         }
     }
 
-    /// Whether a position lies in the region, by shapes alone; cells of a set hold none.
+    /// Returns true if a position lies in the region, by shapes alone; cells of a set hold none.
     pub fn contains(&self, x: &Vector<D>, tolerance: f64) -> bool {
         match self {
             Self::Shape { shape, margin } => shape.contains(x, margin + tolerance),
@@ -125,7 +125,7 @@ impl<const D: usize> Region<D> {
         }
     }
 
-    /// How far `x` is from the region, if it is made of shapes.
+    /// Returns the distance of `x` from the region, negative inside, if it is made of shapes.
     pub fn distance(&self, x: &Vector<D>) -> Option<f64> {
         match self {
             Self::Shape { shape, margin } => Some(shape.signed_distance(x) - margin),

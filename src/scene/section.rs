@@ -16,16 +16,16 @@ use crate::tensor::Vector;
 pub struct Section<const D: usize> {
     /// Its name.
     pub name: String,
-    /// What lies beyond the plane.
+    /// Half-space beyond the plane.
     pub beyond: HalfSpace<D>,
-    /// The part of it whose force is told.
+    /// The part of it whose force is reported.
     pub inside: Region<D>,
     /// The point about which the moment is taken \[m\].
     pub about: Vector<D>,
 }
 
 impl<const D: usize> Section<D> {
-    /// Whether a place lies in the part whose force is told.
+    /// Returns true if a position lies in the part whose force is reported.
     pub fn holds(&self, x: &Vector<D>) -> bool {
         self.beyond.holds(x) && self.inside.contains(x, self.beyond.tolerance)
     }

@@ -9,7 +9,7 @@ pub(crate) struct SelectedCoupling {
     pub otherwise: Option<CouplingSpec>,
     pub coupling: CouplingSpec,
     pub traits: CouplingTraits,
-    /// Where the scene names it, or its kinematics if it does not.
+    /// Span at which the scene names it, or that of its kinematics if it does not.
     pub span: Span,
     pub why: Option<String>,
 }

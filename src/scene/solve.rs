@@ -1,4 +1,4 @@
-//! How a validated scene is carried through time or load.
+//! Analysis of a validated scene: static, in time or in load steps.
 
 use toml::Spanned;
 
@@ -12,7 +12,7 @@ use super::value::{Count, Every, Number, StepTimes};
 use crate::observe::checkpoint::Pace;
 use crate::solve::sub_cycling;
 
-/// What a scene computes.
+/// Type of analysis of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Solve {
     /// One state of equilibrium.
@@ -33,11 +33,11 @@ pub struct Explicit {
     pub step: Option<f64>,
     /// The fraction of the stable step that is taken.
     pub fraction: f64,
-    /// What becomes of a step beyond the stable one.
+    /// Treatment of a step beyond the stable one.
     pub beyond_limit: BeyondLimitSpec,
     /// Steps that the stiffest sites take in each step of all others, if not one.
     pub sub_steps: Option<u32>,
-    /// What becomes of a run in which a mode doubles the energy.
+    /// Treatment of a run in which a mode doubles the energy.
     pub growing_modes: GrowingModesSpec,
     /// Energy gained without work, as a part of the largest energy, at which the run stops.
     pub largest_energy_gain: f64,
@@ -47,7 +47,7 @@ pub struct Explicit {
     pub output_interval: f64,
     /// Time between rows of the history.
     pub history_interval: f64,
-    /// How often a checkpoint is written.
+    /// Interval at which a checkpoint is written.
     pub checkpoint_every: Option<Pace>,
 }
 
@@ -58,9 +58,9 @@ pub struct QuasiStatic {
     pub steps: usize,
     /// The time of each; empty where they are of equal length.
     pub times: Vec<f64>,
-    /// What t reaches at the last step.
+    /// Value of t at the last step.
     pub duration: f64,
-    /// How each step is solved.
+    /// Solution method of each step.
     pub method: LoadStepSpec,
     /// Relative out-of-balance force of a solved step.
     pub tolerance: f64,
@@ -70,11 +70,11 @@ pub struct QuasiStatic {
     pub largest_rotation: Option<f64>,
     /// Load steps between VTU files.
     pub output_every: usize,
-    /// How often a checkpoint is written.
+    /// Interval at which a checkpoint is written.
     pub checkpoint_every: Option<Pace>,
 }
 
-/// What `t` means in a scene.
+/// Meaning of `t` in a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Pacing {
     /// Nothing.
@@ -85,7 +85,7 @@ pub(crate) enum Pacing {
     Moving,
 }
 
-/// What `t` means, and instants at which conditions are looked at before a run.
+/// Meaning of `t`, and instants at which conditions are tested before a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Clock {
     pub pacing: Pacing,
@@ -93,7 +93,7 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Instants at which a condition is looked at: the first if it does not change.
+    /// Instants at which a condition is tested: the first if it does not change.
     pub fn instants(&self, moving: bool) -> &[f64] {
         if moving { &self.instants } else { &[0.0] }
     }
@@ -123,7 +123,7 @@ impl QuasiStatic {
 }
 
 impl Solve {
-    /// What `t` means.
+    /// Returns the meaning of `t`.
     pub(crate) fn clock(&self) -> Clock {
         let (pacing, end) = match self {
             Self::Static => (Pacing::Still, 0.0),
@@ -151,7 +151,7 @@ pub(crate) fn still(place: &str, expression: &Expression) -> Result<(), SceneErr
     .help("use x, y, z only; t belongs into conditions"))
 }
 
-/// What a scene computes.
+/// Reads the analysis of a scene.
 ///
 /// `has_large_strains` tells of materials for strains of any size: they stiffen as they are compressed, and the stable step is that of the undeformed body.
 pub(crate) fn solve(

@@ -48,7 +48,7 @@ pub struct Source {
     pieces: Vec<Piece>,
     mesh: Option<Arc<MeshParts>>,
     functions: Vec<Function>,
-    /// Whether a program made the scene: places are its keys, for nobody has typed the lines.
+    /// True if a program made the scene: places are its keys, for nobody has typed the lines.
     is_built: bool,
 }
 
@@ -57,7 +57,7 @@ struct Piece {
     start: usize,
     name: String,
     text: String,
-    /// What is parsed; empty for the file, which is parsed as it is.
+    /// Text that is parsed; empty for the file, which is parsed as it is.
     toml: String,
 }
 
@@ -97,7 +97,7 @@ impl Source {
         &self.functions
     }
 
-    /// What messages call a place: the file and the line of a scene that was typed; the keys of one that a program made.
+    /// Returns the name and the keys by which messages call a place of a scene that a program made; none for a scene that was typed.
     pub(crate) fn place_of(&self, spans: &[Span]) -> Option<String> {
         if !self.is_built {
             return None;
@@ -294,7 +294,7 @@ fn stand_in(root: &mut DeTable<'_>, name: &str) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// How many keys stand before the `=` of an override, `a."b.c".d=1` has three.
+/// Returns the number of keys before the `=` of an override, `a."b.c".d=1` has three.
 fn keys(text: &str) -> usize {
     let path = format!("{}=0", &text[..text.find('=').unwrap_or(text.len())]);
     let Ok(parsed) = DeTable::parse(&path) else {
@@ -335,7 +335,7 @@ fn plain(value: &DeValue<'_>) -> toml::Value {
     }
 }
 
-/// What stands at a span: its path, and whether the span is that of the key.
+/// Key or value at a span: its path, and whether the span is that of the key.
 pub(super) struct Place {
     pub path: Vec<String>,
     pub is_key: bool,

@@ -23,7 +23,7 @@ impl Table {
         }
     }
 
-    /// What expressions call it.
+    /// Returns the name by which expressions call it.
     pub(crate) fn name(&self) -> &str {
         &self.name
     }

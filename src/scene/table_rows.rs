@@ -113,7 +113,7 @@ fn typed_rows(
     Ok(rows)
 }
 
-/// What rows have to be.
+/// Requirement on the rows of a table.
 const ROWS: &str = "rows are pairs of finite numbers, the first of which increases from row to row: [[0, 0], [1e-3, 5]]";
 
 /// Reads the files of the tables, relative to `directory`; a checkpoint belongs to their rows.

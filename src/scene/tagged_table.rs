@@ -146,7 +146,7 @@ pub(crate) fn merge<'i>(
     }
 }
 
-/// Whether all keys of `new` are choices, none of which `old` has: a key that is none goes in beside what stands there, and is told as a mistake.
+/// Returns true if all keys of `new` are choices, none of which `old` has: a key that is none goes in beside what stands there, and is reported as a mistake.
 fn chooses_otherwise(path: &[String], old: &DeTable<'_>, new: &DeTable<'_>) -> bool {
     let path: Vec<&str> = path.iter().map(String::as_str).collect();
     let mut keys = new.keys().map(|k| k.get_ref().as_ref());

@@ -14,7 +14,7 @@ use crate::scene::points::Points;
 use crate::shape::Barrier;
 use crate::tensor::Vector;
 
-/// Points that are looked at for one shape, at most: a shape among more of them touches some.
+/// Points that are tested for one shape, at most: a shape among more of them touches some.
 const LOOKED_AT: usize = 4_000_000;
 
 /// Points beside a crack whose bonds are tried, at most.
@@ -94,7 +94,7 @@ impl<const D: usize> Parts<'_, D> {
         list
     }
 
-    /// What a body of finite elements alone has no use for.
+    /// Lists the parts of the scene that a body of finite elements alone does not use.
     fn without_points(&self) -> Vec<String> {
         let mut list = Vec::new();
         for (name, material) in &self.spec.materials {
@@ -168,7 +168,7 @@ impl<const D: usize> Parts<'_, D> {
         ))
     }
 
-    /// Whether a cell holds points, or may come to hold them where the zone follows a crack.
+    /// Returns true if a cell holds points, or may come to hold them where the zone follows a crack.
     fn holds(&self, c: usize) -> bool {
         self.scene.zones[c] != Zone::Local || self.scene.follow.is_some()
     }
@@ -183,7 +183,7 @@ impl<const D: usize> Parts<'_, D> {
                 .any(|(c, inside)| *inside && self.holds(c))
     }
 
-    /// Whether any point is `wanted`.
+    /// Returns true if any point is `wanted`.
     fn any(&self, p: &Peridynamics<D>, mut wanted: impl FnMut(&Vector<D>) -> bool) -> bool {
         let mut looked_at = 0;
         for c in (0..self.scene.mesh.cell_count()).filter(|&c| self.holds(c)) {
@@ -226,7 +226,7 @@ impl<const D: usize> Parts<'_, D> {
         false
     }
 
-    /// Whether a barrier cuts a bond. Near it bonds of the nearest points are tried; where there are many of those, one is cut.
+    /// Returns true if a barrier cuts a bond. Near it bonds of the nearest points are tried; where there are many of those, one is cut.
     fn cuts(&self, p: &Peridynamics<D>, barrier: &Barrier<D>) -> bool {
         let mut beside: Vec<Vector<D>> = Vec::new();
         let (low, high) = barrier.bounds();

@@ -27,9 +27,9 @@ use crate::tensor::{Vector, padded};
 /// A validated scene of dimension `D`.
 #[derive(Clone, Debug)]
 pub struct Scene<const D: usize> {
-    /// What the scene says of itself; its name if it says nothing.
+    /// Title of the scene; its name if it has none.
     pub title: String,
-    /// How the body stands for a solid.
+    /// Kinematic assumption by which the body represents a solid.
     pub kinematics: Kinematics,
     /// The mesh of the whole body.
     pub mesh: Mesh<D>,
@@ -45,13 +45,13 @@ pub struct Scene<const D: usize> {
     pub point_law: Arc<dyn Law<D>>,
     /// The peridynamic choices; none if the scene is local throughout.
     pub peridynamics: Option<Peridynamics<D>>,
-    /// How the models are joined.
+    /// Coupling of the models.
     pub coupling: CouplingSpec,
-    /// Why the coupling was chosen; none if the scene names it.
+    /// Reason for the choice of the coupling; none if the scene names it.
     pub coupling_why: Option<String>,
-    /// How the nonlocal zone came about; none if the scene draws it.
+    /// Placement of the nonlocal zone; none if the scene draws it.
     pub placement: Option<Placement>,
-    /// What was chosen for the accuracy that the scene wants, and for points that it does not place.
+    /// Choices made for the accuracy that the scene wants, and for points that it does not place.
     pub choices: Vec<Decision>,
     /// Displacements, tractions, body forces.
     pub conditions: Vec<Condition<D>>,
@@ -61,21 +61,21 @@ pub struct Scene<const D: usize> {
     pub voids: Vec<Shape<D>>,
     /// Voids and cracks that cut bonds.
     pub barriers: Vec<Barrier<D>>,
-    /// What is computed.
+    /// Type of analysis.
     pub solve: Solve,
     /// Displacements and velocities at time zero.
     pub initial: Vec<Initial<D>>,
     /// Rigid bodies that strike or press.
     pub impactors: Vec<Impactor<D>>,
-    /// How bonds deform and break.
+    /// Deformation and fracture of bonds.
     pub breaking: Breaking<D>,
-    /// What elements of the points' materials follow.
+    /// Constitutive law of the elements of the points' materials.
     pub elements: ElementsSpec,
-    /// How the nonlocal zone follows the crack, if it does.
+    /// Settings of a nonlocal zone that follows the crack, if it does.
     pub follow: Option<Follow>,
     /// The linear solver.
     pub solver: Solver,
-    /// What is written.
+    /// Output files.
     pub output: Output<D>,
     /// The scene with the coupling to go on with, if this one was chosen and turns out not to hold.
     pub(crate) otherwise: Option<Box<Self>>,
@@ -85,10 +85,10 @@ pub struct Scene<const D: usize> {
     pub fingerprint: Fingerprint,
 }
 
-/// How the nonlocal zone of a scene was placed that does not draw it.
+/// Placement of the nonlocal zone of a scene that does not draw it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placement {
-    /// What was chosen, and why.
+    /// The choice, and the reason for it.
     pub choice: Decision,
     /// Seconds of all but the solution that the run goes on with.
     pub seconds: f64,
@@ -97,13 +97,13 @@ pub struct Placement {
 /// The linear solver of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solver {
-    /// Which solver.
+    /// Method of solution.
     pub method: crate::solve::statics::Method,
     /// Elimination order of a direct one.
     pub ordering: Ordering,
     /// Relative residual.
     pub tolerance: f64,
-    /// What becomes of a model whose proof refuses it.
+    /// Treatment of a model that fails its proof.
     pub unproven: UnprovenSpec,
     /// Most iterations.
     pub max_iterations: usize,
@@ -116,7 +116,7 @@ pub struct FieldChoice {
     pub asked: Vec<String>,
     /// Count of those that are numbers made of the stress.
     pub stresses: usize,
-    /// Whether there is a normal stress out of the plane: in plane strain.
+    /// True if there is a normal stress out of the plane: in plane strain.
     pub across: bool,
 }
 
@@ -139,9 +139,9 @@ pub struct Output<const D: usize> {
     pub directory: PathBuf,
     /// Beginning of all file names.
     pub name: String,
-    /// Whether a VTU is written.
+    /// True if a VTU is written.
     pub vtu: bool,
-    /// How it shows peridynamic points.
+    /// Representation of peridynamic points in it.
     pub points: super::spec::PointOutputSpec,
     /// The fields that it asks for.
     pub fields: FieldChoice,
@@ -162,14 +162,14 @@ pub struct Tip<const D: usize> {
     pub name: String,
     /// The direction, of length 1.
     pub direction: Vector<D>,
-    /// Where to look.
+    /// Region in which the tip is sought.
     pub inside: Region<D>,
     /// Damage from which a point counts.
     pub threshold: f64,
 }
 
 impl<const D: usize> Scene<D> {
-    /// Whether the horizon varies in space.
+    /// Returns true if the horizon varies in space.
     pub fn horizon_varies(&self) -> bool {
         self.peridynamics
             .as_ref()

@@ -17,7 +17,7 @@ use crate::observe::checkpoint::Pace;
 pub struct Number {
     /// The value.
     pub value: f64,
-    /// Where it stands.
+    /// Span in the text of the scene.
     pub span: Span,
 }
 
@@ -26,7 +26,7 @@ pub struct Number {
 pub struct Count {
     /// The value.
     pub value: usize,
-    /// Where it stands.
+    /// Span in the text of the scene.
     pub span: Span,
 }
 
@@ -35,30 +35,30 @@ pub struct Count {
 pub struct Automatic {
     /// The value; none for "auto".
     pub value: Option<f64>,
-    /// Where it stands.
+    /// Span in the text of the scene.
     pub span: Span,
 }
 
-/// How often something is done: 1000 (steps), or "10 min" of the clock.
+/// Interval at which something is done: 1000 (steps), or "10 min" of the clock.
 #[derive(Clone, Debug)]
 pub struct Every {
-    /// How often.
+    /// The interval.
     pub pace: Pace,
-    /// Where it stands.
+    /// Span in the text of the scene.
     pub span: Span,
 }
 
 /// A number of load steps, or the times of all of them.
 #[derive(Clone, Debug)]
 pub struct Steps {
-    /// What is typed.
+    /// The value as typed.
     pub choice: StepTimes,
-    /// Where it stands.
+    /// Span in the text of the scene.
     pub span: Span,
 }
 
 impl Steps {
-    /// How many load steps there are.
+    /// Returns the number of load steps.
     pub fn count(&self) -> usize {
         match &self.choice {
             StepTimes::Equal(number) => *number,
@@ -81,7 +81,7 @@ pub enum StepTimes {
 pub struct Text {
     /// The text.
     pub value: String,
-    /// Where it stands.
+    /// Span in the text of the scene.
     pub span: Span,
 }
 
@@ -90,7 +90,7 @@ pub struct Text {
 pub struct Coordinates {
     /// The coordinates.
     pub values: Vec<f64>,
-    /// Where they stand.
+    /// Span in the text of the scene.
     pub span: Span,
 }
 

@@ -17,7 +17,7 @@ use crate::{coupling::Zone, parallel};
 pub(crate) struct Placed {
     /// One entry per cell.
     pub nonlocal: Vec<bool>,
-    /// Where the scene asks for it.
+    /// Span at which the scene asks for it.
     pub span: Span,
 }
 
@@ -55,7 +55,7 @@ struct NonlocalZone<const D: usize> {
     region: Region<D>,
     /// One entry per cell.
     inner: Vec<bool>,
-    /// Where the scene asks for it.
+    /// Span at which the scene asks for it.
     span: Span,
 }
 

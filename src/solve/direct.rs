@@ -17,7 +17,7 @@ use crate::solve::symbolic::{FactorCost, Symbolic};
 use crate::system::{BlockCsr, Symmetry};
 use std::time::Instant;
 
-/// What a factorisation did.
+/// Summary of a factorisation.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct DirectInfo {
     /// Elimination order used.

@@ -1,8 +1,8 @@
-//! What a direct solver is asked, and what it refuses.
+//! Parameters of a direct solver, and its errors.
 
 use crate::system::Symmetry;
 
-/// What a factorisation may be asked for.
+/// Parameters of a factorisation.
 #[derive(Clone, Copy, Debug)]
 pub struct DirectParams {
     /// Cholesky for `Symmetric`, LU for `Unsymmetric`.
@@ -26,7 +26,7 @@ impl Default for DirectParams {
     }
 }
 
-/// Why a factorisation failed.
+/// Failure of a factorisation.
 #[derive(Debug, thiserror::Error)]
 pub enum DirectError {
     /// The factors would not fit.

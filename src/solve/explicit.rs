@@ -63,7 +63,7 @@ pub struct Explicit<'a> {
     own: Segments,
     /// Sites of other processes that are moved here too.
     ghosts: Segments,
-    /// What belongs to steps that processes share; none where each moves all sites.
+    /// Data of steps that processes share; none where each moves all sites.
     shared: Option<shared::Shared>,
 }
 
@@ -292,7 +292,7 @@ impl<'a> Explicit<'a> {
         self.check_numbers()
     }
 
-    /// The internal force at the displacement that was reached, with what it broke.
+    /// The internal force at the displacement that was reached, with the bonds that it broke.
     fn respond(&mut self) -> shared::Outcome {
         if self.shared.is_some() {
             return self.respond_at_own();
@@ -403,7 +403,7 @@ impl<'a> Explicit<'a> {
             );
     }
 
-    /// Whether numbers are finite and the energy is one that was put in.
+    /// Tests that the numbers are finite and that the kinetic energy does not exceed the energy supplied by more than a factor.
     fn check_numbers(&self) -> Result<(), ExplicitError> {
         let Energies {
             kinetic,
@@ -469,7 +469,7 @@ impl<'a> Explicit<'a> {
         })
     }
 
-    /// Where the motion stands; where processes move their own sites alone, the numbers of others are there once they are gathered ([`Explicit::gather`]).
+    /// State of the motion; where processes move their own sites alone, the numbers of others are there once they are gathered ([`Explicit::gather`]).
     pub fn state(&self) -> &State {
         &self.state
     }
@@ -489,7 +489,7 @@ impl<'a> Explicit<'a> {
         &self.applied
     }
 
-    /// What moves.
+    /// The system in motion.
     pub fn system(&self) -> &dyn SemiDiscrete {
         &*self.system
     }
@@ -532,7 +532,7 @@ impl<'a> Explicit<'a> {
     }
 }
 
-/// Whether the load of prescribed dofs has just been evaluated.
+/// Load of prescribed dofs: newly evaluated, or kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Reading {
     Fresh,

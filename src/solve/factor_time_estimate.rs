@@ -1,4 +1,4 @@
-//! How long a direct solve will take on this machine, from a few of its fronts, factorised with made-up entries.
+//! Duration of a direct solve on this machine, estimated from a few of its fronts, factorised with made-up entries.
 //!
 //! Fronts are sorted into classes by their operations; of each class one front runs, with the pivots, rows and
 //! contribution blocks that it will have, and counts for all. Large ones run shrunk, and count by their operations. So the

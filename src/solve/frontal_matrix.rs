@@ -2,7 +2,7 @@
 //!
 //! A front of `p` pivots and `r` rows is held as `panel` (`(p + r) × p`), `upper` (`p × r`, LU only) and `schur`
 //! (`r × r`), all column-major. Tiles do not depend on the number of threads and every tile is computed by one
-//! thread, so that the factors have the same bits on any machine with the same instruction set. Progress is told of
+//! thread, so that the factors have the same bits on any machine with the same instruction set. Progress is reported of
 //! every tile of columns: a large front takes seconds, and a listener may end the computation there.
 
 use crate::{parallel, progress::Progress};

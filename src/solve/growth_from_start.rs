@@ -70,8 +70,8 @@ pub fn energy_gained(
     Ok(Some(sum * sum / energy))
 }
 
-/// Growth by less than `exp` of this is what rounding makes of double eigenvalues.
+/// Growth by less than `exp` of this is due to the rounding of double eigenvalues.
 const LEAST: f64 = 1e-3;
 
-/// What rounding adds to a motion in a step, of its size.
+/// Rounding error that a step adds to a motion, relative to its size.
 const ROUND_OFF: f64 = 1e-16;

@@ -1,4 +1,4 @@
-//! Modes that grow: whether a motion is bounded at any step.
+//! Modes that grow: tests if a motion is bounded at any step.
 //!
 //! A mode with `K w = λ M w` grows as `exp(σ t)`, `σ = |Re √(−λ)|`, unless λ is real and not negative; where `K` is not symmetric that is a question. Steps of Δt add to it near the
 //! limit of the step: `σ = 2/Δt |Re arsinh(Δt/2 √(−λ))|`, three times as fast for a weak pair of complex λ at 0.95 of the limit. The rates here are those of the stepped motion.
@@ -16,10 +16,10 @@ use crate::{
     system::{Ranks, SemiDiscrete, Symmetry},
 };
 
-/// What to do about an unstable partial stress.
+/// Remedy for an unstable partial stress.
 pub const REMEDY: &str = "give the material and the divergence an influence function P_n/|xi| with n >= 1 (bond-based: micromodulus triangular), keep the horizon constant in the transition zone, or use coupling.truncated";
 
-/// What to do about a splice or a blending whose motion grows.
+/// Remedy for a splice or a blending whose motion grows.
 pub const REMEDY_SEAM: &str = "make the run shorter, or use coupling.truncated if the material allows, whose stiffness is symmetric";
 
 /// Unknowns up to which eigenvalues are computed one and all: a second of time.
@@ -31,7 +31,7 @@ const SHOWN: f64 = 4.0;
 /// Growth by `exp` of this over a planned run is refused: the energy of the mode doubles.
 pub const LARGEST_GAIN: f64 = 0.5 * std::f64::consts::LN_2;
 
-/// How fast the fastest growing mode of a model grows.
+/// Growth rate of the fastest growing mode of a model.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Growth {
     /// σ of the fastest growing mode \[1/s\]; 0 if none was found.
@@ -44,11 +44,11 @@ pub struct Growth {
     pub site: usize,
     /// Products with the stiffness that it took.
     pub products: usize,
-    /// What was computed.
+    /// The computation behind it.
     pub evidence: Evidence,
 }
 
-/// What a [`Growth`] was found by.
+/// Computation behind a [`Growth`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Evidence {
@@ -56,7 +56,7 @@ pub enum Evidence {
     Eigenvalues,
     /// A run from noise, and all eigenvalues of so many neighbourhoods of the seam.
     Noise {
-        /// How many.
+        /// Number of neighbourhoods.
         neighbourhoods: usize,
     },
 }
@@ -102,7 +102,7 @@ pub fn stepped_growth_rate(real: f64, imaginary: f64, step: f64) -> f64 {
     (excess + (excess * (excess + 2.0)).sqrt()).ln_1p() / half
 }
 
-/// How fast the model's motion grows, for a run of `steps` steps of size `step` (zero: the motion without steps, of a small model); `prescribed` lists the dofs that are not free.
+/// Computes the growth rate of the model's motion, for a run of `steps` steps of size `step` (zero: the motion without steps, of a small model); `prescribed` lists the dofs that are not free.
 ///
 /// Up to [`DENSE`] unknowns all eigenvalues are computed. Beyond, a tenth of the steps is run from noise (at least 200 and at most 4000), and the eigenvalues of one to four neighbourhoods of the seam are computed if the model has no symmetry.
 ///
@@ -144,7 +144,7 @@ pub fn growth(
 /// Steps times unknowns of a run that pays for the eigenvalues of a neighbourhood with some 5 % of its own time.
 const WORK_PER_NEIGHBOURHOOD: f64 = 1.3e8;
 
-/// What is asked of the neighbourhoods of the seam.
+/// Search for growth in the neighbourhoods of the seam.
 struct NearSeam<'a> {
     prescribed: &'a [u32],
     step: f64,
@@ -326,7 +326,7 @@ impl Fastest {
         all.map(|x| x.to_bits()).collect()
     }
 
-    /// What [`Fastest::words`] gave; none of no words.
+    /// Reads the result of [`Fastest::words`]; none of no words.
     fn from_words(words: &[u64]) -> Option<Self> {
         let numbers: Vec<f64> = words.iter().map(|&w| f64::from_bits(w)).collect();
         let (&[largest, re, im], vector) = numbers.split_first_chunk()?;
@@ -381,7 +381,7 @@ fn growth_by_eigenvalues(
     Ok((found, real))
 }
 
-/// Growth as a run from noise shows it, and what the noise has become.
+/// Growth as a run from noise shows it, and the final state of the noise.
 fn growth_from_noise(
     operator: &mut Scaled<'_>,
     step: f64,

@@ -21,7 +21,7 @@ impl LinearMap for Identity {
     }
 }
 
-/// When an iteration stops.
+/// Stopping criteria of an iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KrylovParams {
     /// Relative residual `‖b − A x‖₂ / ‖b‖₂` to be reached.
@@ -43,7 +43,7 @@ impl Default for KrylovParams {
     }
 }
 
-/// What an iteration did.
+/// Summary of an iteration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct KrylovInfo {
     /// Applications of the preconditioned operator.
@@ -52,7 +52,7 @@ pub struct KrylovInfo {
     pub relative_residual: f64,
 }
 
-/// Why an iteration stopped short.
+/// Reason why an iteration stopped short.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum KrylovError {
     /// A direction with `p·A p ≤ 0`, or a preconditioner with `r·M r ≤ 0`.
@@ -72,7 +72,7 @@ pub enum KrylovError {
         /// Iterations done.
         iterations: usize,
     },
-    /// Whoever listens asked for the end.
+    /// The listener asked for the end.
     #[error("interrupted at iteration {iteration}")]
     Interrupted {
         /// Iteration at which it was.
@@ -197,7 +197,7 @@ fn orthogonalise(basis: &[Vec<f64>], w: &mut [f64]) -> Vec<f64> {
     column
 }
 
-/// Whether nobody asks to end.
+/// Fails if the listener asks for the end of the run.
 fn goes_on(progress: &dyn Progress, iteration: usize) -> Result<(), KrylovError> {
     match progress.asks_to_end() {
         true => Err(KrylovError::Interrupted { iteration }),

@@ -7,14 +7,14 @@
 //! | `quasi_static.rs`, `quasi_static/` | load steps: equilibrium by Newton's method or by relaxation, then breaking bonds |
 //! | `explicit.rs`, `explicit/` | explicit dynamics by velocity Verlet |
 //! | `stable_step.rs`, `sub_cycling.rs` | its stable step; several steps of stiff sites within one of the others |
-//! | `instability_growth.rs`, `growth_from_start.rs` | modes that grow at any step; what they make of a motion from a known start |
-//! | `direct.rs`, `direct_params.rs` | the multifrontal direct solver; what it is asked and refuses |
+//! | `instability_growth.rs`, `growth_from_start.rs` | modes that grow at any step; the energy that they add to a motion from a known start |
+//! | `direct.rs`, `direct_params.rs` | the multifrontal direct solver; its parameters and errors |
 //! | `ordering.rs`, `symbolic.rs` | elimination orders; elimination tree, supernodes and costs |
 //! | `multifrontal.rs`, `frontal_matrix.rs` | numerical factorisation over that tree; of one dense front |
-//! | `factor_time_estimate.rs` | how long it will take |
+//! | `factor_time_estimate.rs` | its duration |
 //! | `krylov.rs` | conjugate gradients and restarted GMRES |
 //! | `multigrid.rs`, `aggregation.rs`, `smoother.rs` | smoothed-aggregation multigrid, its coarse matrices, its smoothers |
-//! | `singularity_diagnosis.rs` | what is free to move in a singular system |
+//! | `singularity_diagnosis.rs` | free motions of a singular system |
 //! | `neighbourhood.rs` | the surroundings of one site as a small model |
 //! | `stencils.rs` | model matrices on lattices, for tests and benchmarks |
 
@@ -44,7 +44,7 @@ use crate::solve::krylov::LinearMap;
 use crate::system::BlockCsr;
 use rayon::prelude::*;
 
-/// Which dofs are unknown; the others are prescribed.
+/// Dofs that are unknown; the others are prescribed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FreeDofs {
     block: usize,
@@ -76,7 +76,7 @@ impl FreeDofs {
         FreeDofs { block, bits }
     }
 
-    /// Whether dof `a` of site `i` is unknown.
+    /// Returns true if dof `a` of site `i` is unknown.
     pub fn is_free(&self, i: usize, a: usize) -> bool {
         self.bits[i] >> a & 1 == 1
     }

@@ -16,7 +16,7 @@ use crate::solve::smoother::{BlockJacobi, Chebyshev, Residual};
 use crate::solve::{FreeDofs, FreeOperator};
 use crate::system::BlockCsr;
 
-/// How a hierarchy is built.
+/// Parameters of a hierarchy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MultigridParams {
     /// A level with at most this many dofs is factorised.
@@ -40,7 +40,7 @@ impl Default for MultigridParams {
     }
 }
 
-/// What a hierarchy looks like.
+/// Sizes of a hierarchy.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct MultigridInfo {
     /// Dofs of each level, the finest first.
@@ -49,7 +49,7 @@ pub struct MultigridInfo {
     pub operator_complexity: f64,
 }
 
-/// Why a hierarchy could not be built.
+/// Failure of the setup of a hierarchy.
 #[derive(Debug, thiserror::Error)]
 pub enum MultigridError {
     /// The diagonal block of a site cannot be inverted.

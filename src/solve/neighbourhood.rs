@@ -1,4 +1,4 @@
-//! A neighbourhood of one site of a model, cut out as a small model of its own: what lies outside is held.
+//! A neighbourhood of one site of a model, cut out as a small model of its own: all sites outside are held.
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -82,7 +82,7 @@ impl Neighbourhood {
         })
     }
 
-    /// Whether a site of the model belongs to it.
+    /// Returns true if a site of the model belongs to it.
     pub fn contains(&self, site: u32) -> bool {
         self.sites.binary_search(&site).is_ok()
     }

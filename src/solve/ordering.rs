@@ -37,7 +37,7 @@ pub enum Ordering {
     Amd,
 }
 
-/// Why an elimination order could not be computed.
+/// Failure of the computation of an elimination order.
 #[derive(Debug, thiserror::Error)]
 pub enum OrderingError {
     /// The graph has more edges than the ordering code can index.
@@ -170,7 +170,7 @@ impl SiteGraph {
         self.sites.len()
     }
 
-    /// Whether no dof is free.
+    /// Returns true if no dof is free.
     pub fn is_empty(&self) -> bool {
         self.sites.is_empty()
     }

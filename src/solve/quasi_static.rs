@@ -75,7 +75,7 @@ pub struct LoadStep<'a> {
     pub work: f64,
     /// Bonds broken in this step.
     pub broken: u64,
-    /// How often bonds broke.
+    /// Rounds in which bonds broke.
     pub rounds: usize,
     /// Products with the stiffness, or passes over the bonds.
     pub iterations: usize,
@@ -85,11 +85,11 @@ pub struct LoadStep<'a> {
     pub residual: f64,
     /// Relative residuals on the way to the last equilibrium of Newton's method, from the prediction on.
     pub residuals: &'a [f64],
-    /// What is deformed.
+    /// The deformed system.
     pub system: &'a dyn SemiDiscrete,
 }
 
-/// What a run did.
+/// Summary of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct QuasiStaticInfo {
     /// Load steps.

@@ -1,4 +1,4 @@
-//! Names what is free to move in a singular system.
+//! Names the free motions in a singular system.
 //!
 //! Before factorisation: free dofs with an empty row, and connected bodies whose prescribed dofs do not hold all their
 //! rigid-body modes. After a tiny pivot: the null vector by inverse iteration, for mechanisms that are not rigid.
@@ -16,9 +16,9 @@ use nalgebra::{DMatrix, DVector};
 pub struct FreeMotion {
     /// The sites that move, ascending.
     pub sites: Vec<usize>,
-    /// How they move, for people: rigid-body modes by name, an empty row, or a mechanism.
+    /// Their free motions, in words: rigid-body modes by name, an empty row, or a mechanism.
     pub modes: Vec<String>,
-    /// What to do about it.
+    /// The remedy.
     pub remedy: String,
 }
 
@@ -65,7 +65,7 @@ fn mode_name(block: usize, mode: usize) -> String {
 #[derive(Clone, Copy)]
 pub(crate) struct HeldRows<'a> {
     pub matrix: &'a BlockCsr,
-    /// Where sites are spread over ranks; every function of these rows is then collective.
+    /// The partition, where sites are spread over ranks; every function of these rows is then collective.
     pub spread: Option<Spread<'a>>,
 }
 
@@ -292,7 +292,7 @@ fn free_rigid_motions(
     names
 }
 
-/// Whether the internal force of a motion of `sites` vanishes on their free dofs.
+/// Returns true if the internal force of a motion of `sites` vanishes on their free dofs.
 fn meets_no_force(
     rows: &HeldRows<'_>,
     free: &FreeDofs,

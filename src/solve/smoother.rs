@@ -96,7 +96,7 @@ impl LinearMap for BlockJacobi {
     }
 }
 
-/// Whether a smoother leaves the residual up to date.
+/// Residual after a smoother: up to date, or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Residual {
     /// The residual is that of the smoothed solution.

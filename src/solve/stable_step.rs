@@ -1,4 +1,4 @@
-//! The stable step of velocity Verlet, and whether a model is stable at any step.
+//! The stable step of velocity Verlet, and the instability of a model at any step.
 //!
 //! A mode with `K w = λ M w` is stepped by `w_{n+1} − 2 w_n + w_{n−1} = −Δt² λ w_n`, which is bounded if and only if λ is real and `0 ≤ λ ≤ 4/Δt²`.
 //! So there are two questions. How large is the largest λ? And, where `K` is not symmetric, is any λ negative or complex? Such a mode grows as
@@ -29,7 +29,7 @@ pub const MARGIN: f64 = 0.04;
 /// Probability with which the sharp bound of a symmetric model may fail.
 const FAILURE: f64 = 1e-9;
 
-/// Products between two looks at whether a step may stay.
+/// Products between two tests if a step may stay.
 const ASKED: usize = 2;
 
 /// Basis vectors of Arnoldi may take this many bytes.
@@ -38,9 +38,9 @@ const BASIS_BYTES: usize = 512 << 20;
 /// The limits of the time step of a model \[s\].
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct StepLimit {
-    /// What row sums guarantee.
+    /// Step that row sums guarantee to be stable.
     pub certified: f64,
-    /// The site of that row.
+    /// The site of the largest row sum over mass.
     pub certified_site: usize,
     /// `2/√θ` of the largest Ritz value: the true limit, or a little above.
     pub estimate: f64,
@@ -50,7 +50,7 @@ pub struct StepLimit {
     pub products: usize,
 }
 
-/// Why a step, or a model, is refused.
+/// Refusal of a time step, or of a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StepError {
     /// The step is too large.
@@ -64,7 +64,7 @@ pub enum StepError {
         stable: f64,
         /// The limit as estimated \[s\].
         limit: f64,
-        /// Where the highest mode is largest.
+        /// Site at which the highest mode is largest.
         site: usize,
     },
     /// The step is no step.
@@ -100,9 +100,9 @@ pub enum StepError {
         real: f64,
         /// Imaginary part of λ.
         imaginary: f64,
-        /// Where the mode is largest.
+        /// Site at which the mode is largest.
         site: usize,
-        /// What to do.
+        /// The remedy.
         remedy: String,
     },
     /// Eigenvalues did not come out.
@@ -183,7 +183,7 @@ impl<'a> Scaled<'a> {
         x
     }
 
-    /// How large a mode is at a site, in displacements.
+    /// Returns the size of a mode at a site, in displacements.
     pub(super) fn size_at(&self, mode: &[f64], site: usize) -> f64 {
         let d = self.system.block().max(1);
         (site * d..(site + 1) * d).fold(0.0, |m: f64, k| m.max((mode[k] * self.root[k]).abs()))
@@ -229,7 +229,7 @@ pub fn stable_step(system: &dyn SemiDiscrete, prescribed: &[u32]) -> Result<Step
 pub struct Held {
     /// The step \[s\].
     pub step: f64,
-    /// What it may be of the stable step at most.
+    /// Largest part of the stable step that it may be.
     pub fraction: f64,
 }
 
@@ -365,7 +365,7 @@ fn margin_of(unknowns: usize, products: usize) -> f64 {
     (needed / (2.0 * products as f64 - 1.0)).powi(2)
 }
 
-/// What of the highest mode is asked for.
+/// Part of the highest mode that is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Want {
     Value,

@@ -22,7 +22,7 @@ pub use spread::{SpreadProblem, SpreadRows, solve_spread};
 pub struct StaticProblem<'a> {
     /// The stiffness `K`, rows of prescribed dofs included (reactions need them).
     pub stiffness: &'a BlockCsr,
-    /// Whether `K = Kᵀ`.
+    /// Symmetry of `K`.
     pub symmetry: Symmetry,
     /// Position of each site; unused components are zero.
     pub positions: &'a [[f64; 3]],
@@ -32,7 +32,7 @@ pub struct StaticProblem<'a> {
     pub prescribed: &'a [Option<f64>],
 }
 
-/// How to solve.
+/// Method of solution.
 #[derive(
     Clone,
     Copy,
@@ -55,10 +55,10 @@ pub enum Method {
     Krylov,
 }
 
-/// What a static solve may be asked for.
+/// Parameters of a static solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StaticParams {
-    /// How to solve.
+    /// Method of solution.
     pub method: Method,
     /// Elimination order of a direct factorisation.
     pub ordering: Ordering,
@@ -123,7 +123,7 @@ impl MethodUsed {
     }
 }
 
-/// What a static solve did.
+/// Summary of a static solve.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct StaticInfo {
     /// The method that was used.
@@ -157,11 +157,11 @@ pub struct StaticSolution {
     pub displacement: Vec<f64>,
     /// `K u − f` on prescribed dofs, zero elsewhere: the force that the support exerts.
     pub reactions: Vec<f64>,
-    /// What was done.
+    /// Summary of the solve.
     pub info: StaticInfo,
 }
 
-/// Why a static problem was not solved.
+/// Failure of a static solve.
 #[derive(Debug, thiserror::Error)]
 pub enum StaticError {
     /// An input has the wrong length.
@@ -174,7 +174,7 @@ pub enum StaticError {
         /// The length needed.
         expected: usize,
     },
-    /// Whoever listens asked for the end.
+    /// The listener asked for the end.
     #[error("interrupted after {iterations} iterations")]
     Interrupted {
         /// Iterations done.
@@ -202,9 +202,9 @@ pub enum StaticError {
         sites: Vec<usize>,
         /// Positions of the first few of them.
         positions: Vec<[f64; 3]>,
-        /// How they move.
+        /// Their free motions.
         modes: Vec<String>,
-        /// What to do.
+        /// The remedy.
         remedy: String,
     },
     /// The residual stayed above the tolerance.
@@ -223,7 +223,7 @@ pub enum StaticError {
     /// The ranks have no solver for the problem.
     #[error("no solver over ranks: {message}")]
     Ranks {
-        /// What it complains of.
+        /// The message of the solver.
         message: String,
     },
     /// The residual of a solver over ranks stayed above the tolerance.
@@ -238,9 +238,9 @@ pub enum StaticError {
         tolerance: f64,
         /// Iterations done.
         iterations: usize,
-        /// What the solver says.
+        /// The reason that the solver gives.
         why: String,
-        /// What to do first.
+        /// The remedy to try first.
         remedy: &'static str,
     },
     /// Newton's method found no equilibrium of forces that are not linear.
@@ -253,7 +253,7 @@ pub enum StaticError {
         residual: f64,
         /// Iterations spent.
         iterations: usize,
-        /// Where the residual is largest.
+        /// Site at which the residual is largest.
         site: usize,
         /// Its position.
         position: [f64; 3],
@@ -278,7 +278,7 @@ fn first_places(sites: &[usize], positions: &[[f64; 3]]) -> String {
         .join(", ")
 }
 
-/// How many positions an error lists.
+/// Number of positions that an error lists at most.
 const LISTED: usize = 4;
 
 /// Solves a static problem.

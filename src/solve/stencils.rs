@@ -36,7 +36,7 @@ impl StencilGrid {
         self.counts.iter().product()
     }
 
-    /// Whether there is no site.
+    /// Returns true if there is no site.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -34,7 +34,7 @@ const TRIALS: usize = 12;
 /// Sites beyond this part of all, the stiffest, may be fine: sub-steps of more save little.
 const COARSE: f64 = 0.75;
 
-/// Why a system is not sub-cycled.
+/// Reasons against sub-cycling of a system.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SubCyclingError {
     /// No energy, no guarantee.
@@ -55,7 +55,7 @@ pub enum SubCyclingError {
         "the step is limited by {what}, which cannot be sub-cycled: use fewer sub-steps, or leave them out"
     )]
     NoGain {
-        /// By what.
+        /// The limit of the step, in words.
         what: &'static str,
     },
     /// The rows give no frequency.
@@ -66,14 +66,14 @@ pub enum SubCyclingError {
 /// The most sub-steps: beyond it, cells of such different sizes are a mistake of the mesh.
 pub const MOST: u32 = 16;
 
-/// The stiff sites of a system, and what their sub-steps need.
+/// The stiff sites of a system, and the data of their sub-steps.
 #[derive(Clone, Debug)]
 pub struct FineSites {
     /// Ascending.
     sites: Vec<u32>,
     /// Sites that the columns of the fine ones reach, ascending.
     rows: Vec<u32>,
-    /// Where among them each fine site is.
+    /// Position of each fine site among them.
     row_of_fine: Vec<u32>,
     /// Those columns.
     columns: BlockCsr,
@@ -123,14 +123,14 @@ impl Recurrence {
     }
 }
 
-/// Whether a sum is wanted, or the bound of its terms.
+/// Kind of sum: signed, or the bound by the absolute values of its terms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Terms {
     Signed,
     Absolute,
 }
 
-/// Whether each dof is free.
+/// Returns true for each dof that is free.
 fn free_dofs(system: &dyn SemiDiscrete, prescribed: &[u32]) -> Vec<bool> {
     let d = system.block().max(1);
     let mut is_free = vec![true; system.mass().len() * d];
@@ -154,7 +154,7 @@ fn rates(system: &dyn SemiDiscrete, is_free: &[bool]) -> Vec<f64> {
 impl FineSites {
     /// The sites that limit the step, for `sub_steps` steps of them; `prescribed` lists the dofs that are not free.
     ///
-    /// Fine are sites whose row sum over mass exceeds what the coarse step bears, where nothing breaks ([`SemiDiscrete::tangent_is_constant`]).
+    /// Fine are sites whose row sum over mass exceeds the bound of the coarse step, where nothing breaks ([`SemiDiscrete::tangent_is_constant`]).
     ///
     /// # Errors
     /// [`SubCyclingError`].

@@ -1,9 +1,9 @@
-//! Symbolic factorisation on the site graph: elimination tree, supernodes, and what the factors will cost.
+//! Symbolic factorisation on the site graph: elimination tree, supernodes, and the cost of the factors.
 
 use crate::solve::ordering::SiteGraph;
 use crate::system::Symmetry;
 
-/// What a factorisation will cost, from the pattern alone.
+/// Cost of a factorisation, from the pattern alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct FactorCost {
     /// Scalars stored in the factors.

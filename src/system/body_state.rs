@@ -21,7 +21,7 @@ pub trait BodyState {
     /// Number of points that have lost so many bonds that their law does not respond: they carry no stress of their own.
     fn points_without_response(&self, u: &[f64]) -> usize;
 
-    /// Numbers that the law remembers of each site, by name; zero for a site that remembers nothing.
+    /// History variables of the law at each site, by name; zero for a site without history.
     fn remembered(&self) -> Vec<(&'static str, Vec<f64>)>;
 
     /// Numbers that the local laws of finite elements remember, by name and cell.

@@ -1,4 +1,4 @@
-//! What finite elements whose law is not linear add to the tangent at rest.
+//! Part of the tangent that finite elements whose law is not linear add to the tangent at rest.
 
 use super::{BlockCsr, Symmetry};
 
@@ -7,9 +7,9 @@ use super::{BlockCsr, Symmetry};
 pub struct ElementTangent {
     /// A row for each site; none of them shares its blocks.
     pub excess: BlockCsr,
-    /// Whether it is symmetric.
+    /// Its symmetry.
     pub symmetry: Symmetry,
-    /// Whether all else is linear, so that the tangent at rest and this are the whole tangent.
+    /// True if all else is linear, so that the tangent at rest and this are the whole tangent.
     pub is_whole: bool,
 }
 

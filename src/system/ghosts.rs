@@ -2,7 +2,7 @@
 
 use super::{Exchange, Partition, Ranks, Spread};
 
-/// What a process exchanged with others.
+/// Traffic of a process with others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Traffic {
     /// Sites that it computes.
@@ -13,7 +13,7 @@ pub struct Traffic {
     pub sent_sites: u64,
     /// Exchanges, one for each step.
     pub exchanges: u64,
-    /// What it received in all of them \[bytes\].
+    /// Data that it received in all of them \[bytes\].
     pub received_bytes: u64,
 }
 

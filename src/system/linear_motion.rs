@@ -9,7 +9,7 @@ pub struct LinearMotion {
     pub stiffness: BlockCsr,
     /// Lumped mass of each site \[kg\].
     pub mass: Vec<f64>,
-    /// Whether `K` is symmetric.
+    /// Symmetry of `K`.
     pub symmetry: Symmetry,
 }
 

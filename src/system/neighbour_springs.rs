@@ -18,7 +18,7 @@ const LONG: usize = 2;
 /// Blocks that rows share this many times are worth sharing.
 const SHARED: f64 = 4.0;
 
-/// Whether so many rows with so many blocks in them, of which so many are distinct, are long and share their blocks.
+/// Returns true if so many rows with so many blocks in them, of which so many are distinct, are long and share their blocks.
 pub(crate) fn share_long_rows(dimension: usize, [rows, blocks, distinct]: [f64; 3]) -> bool {
     let neighbours = 3usize.pow(dimension as u32);
     blocks >= (LONG * neighbours) as f64 * rows && blocks >= SHARED * distinct

@@ -1,8 +1,8 @@
-//! Which of several processes has which sites.
+//! Partition of the sites over several processes.
 
 use crate::parallel;
 
-/// Which rank has which sites.
+/// Partition of the sites over ranks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Partition {
     /// The rank of each site.
@@ -107,7 +107,7 @@ impl Partition {
     }
 }
 
-/// Which sites take part in the forces of which others, either way: what a partition cuts.
+/// Graph of the sites that take part in each other's forces, either way: its edges are those that a partition cuts.
 #[derive(Clone, Debug)]
 pub struct NeighbourGraph {
     /// Start of each site's neighbours, and their end.

@@ -1,4 +1,4 @@
-//! The stress of a place, as a system tells it to whoever writes it.
+//! The stress of a place, as a system gives it for output.
 
 use crate::tensor::Tensor;
 

@@ -1,4 +1,4 @@
-//! Several processes that compute one run together: what the library asks of them, and values that are spread over them.
+//! Several processes that compute one run together: the interface by which the library uses them, and values that are spread over them.
 //!
 //! All of them do the same, in the same order, with the same mesh; each computes the rows of its own sites. Whoever starts them supplies [`Ranks`]: the library
 //! knows no message passing. Sites are numbered anew for such a run, rank by rank, so that the rows of a rank follow one another.
@@ -12,7 +12,7 @@ pub trait Ranks: Send + Sync + std::fmt::Debug {
     /// The number of this process, from zero.
     fn rank(&self) -> usize;
 
-    /// How many processes there are.
+    /// Returns the number of processes.
     fn count(&self) -> usize;
 
     /// Collective: overwrites `all` with the numbers of all ranks, one rank after another; the same on every rank.
@@ -57,7 +57,7 @@ pub trait Exchange: Send + Sync + std::fmt::Debug {
     fn end(&mut self, wanted: &mut [f64]);
 }
 
-/// How a system that is spread over ranks is solved.
+/// Method by which a system that is spread over ranks is solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RankSolverKind {
     /// Conjugate gradients or restarted GMRES, by the symmetry, preconditioned by algebraic multigrid.
@@ -73,22 +73,22 @@ pub enum RankSolverKind {
 pub struct RankRows<'a> {
     /// The rows of the own sites, ascending by site; columns are sites.
     pub matrix: &'a BlockCsr,
-    /// Which rank has which sites.
+    /// Partition of the sites over ranks.
     pub partition: &'a Partition,
-    /// Whether the whole matrix is symmetric.
+    /// Symmetry of the whole matrix.
     pub symmetry: Symmetry,
     /// Position of each site \[m\], padded with zeros.
     pub positions: &'a [[f64; 3]],
-    /// Whether each unknown is prescribed.
+    /// True for each unknown that is prescribed.
     pub prescribed: &'a [bool],
 }
 
-/// What a solver of [`Ranks`] did.
+/// Summary of a solve by a solver of [`Ranks`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct RankSolve {
     /// Iterations.
     pub iterations: usize,
-    /// Why it stopped short of the tolerance, in the solver's own words, if it did.
+    /// Reason why it stopped short of the tolerance, in the solver's own words, if it did.
     pub failure: Option<String>,
 }
 
@@ -123,7 +123,7 @@ pub(crate) fn first_text(ranks: &dyn Ranks, own: Option<&str>) -> Option<String>
     String::from_utf8(bytes).ok()
 }
 
-/// Where the part of each rank begins.
+/// Returns the offset of the part of each rank.
 fn starts(lengths: &[usize]) -> Vec<usize> {
     let mut end = 0;
     let begin = |n: &usize| {
@@ -138,7 +138,7 @@ fn starts(lengths: &[usize]) -> Vec<usize> {
 pub struct Spread<'a> {
     /// The processes.
     pub ranks: &'a dyn Ranks,
-    /// Which of them has which sites.
+    /// Partition of the sites over them.
     pub partition: &'a Partition,
 }
 

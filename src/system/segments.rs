@@ -1,11 +1,11 @@
-//! Some of many numbers, as ranges within chunks of fixed length: what loops over chunks go through where a process has some sites only.
+//! Some of many numbers, as ranges within chunks of fixed length: the numbers that loops over chunks traverse where a process has some sites only.
 
 use std::ops::Range;
 
 /// Marked places, as ranges in each chunk.
 #[derive(Clone, Debug)]
 pub struct Segments {
-    /// Where the ranges of each chunk begin, and the end.
+    /// Offset of the ranges of each chunk, and the end.
     starts: Vec<u32>,
     /// From the start of the chunk.
     ranges: Vec<Range<u32>>,

@@ -5,14 +5,14 @@
 
 use super::BlockCsr;
 
-/// Which rows of a [`BlockCsr`] share their blocks.
+/// Rows of a [`BlockCsr`] that share their blocks.
 ///
 /// Shapes: one entry per block row in each.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SharedRows {
     /// First block of each row, counted in blocks from the start of the values.
     pub starts: Vec<usize>,
-    /// Whether a row has the blocks of the row before it and its columns plus one.
+    /// True if a row has the blocks of the row before it and its columns plus one.
     pub follows: Vec<bool>,
 }
 

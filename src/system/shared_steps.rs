@@ -1,11 +1,11 @@
-//! Steps of which each process takes those of its own sites, and of their ghosts: what a driver asks of a system that is spread over processes.
+//! Steps of which each process takes those of its own sites, and of their ghosts: the interface of a system that is spread over processes to its driver.
 //!
 //! A process moves its own sites and its ghosts by forces that are its own or come from their processes, so that it never needs another number of a ghost.
-//! What asks for all sites, as tables and files do, gathers them before.
+//! Output that needs all sites, as tables and files do, gathers them before.
 
 use super::{ExactSum, FailureUpdate, Halfway, Traffic};
 
-/// What bonds cost that broke in one step, at own sites: sums that processes add.
+/// Cost of the bonds that broke in one step, at own sites: sums that processes add.
 #[derive(Clone, Debug, Default)]
 pub struct LostToBreaks {
     /// See [`super::Dissipation::energy`].
@@ -21,19 +21,19 @@ pub trait SharedSteps {
     /// Collective: begins to share steps, where all processes have the numbers of all sites.
     fn begin(&mut self);
 
-    /// Whether each site is this process's own.
+    /// Returns true for each site that is this process's own.
     fn own(&self) -> Vec<bool>;
 
-    /// Whether each site is its own or a ghost.
+    /// Returns true for each site that is its own or a ghost.
     fn known(&self) -> Vec<bool>;
 
     /// Collective: overwrites the forces of own sites and ghosts, and returns how many bonds of own sites broke.
     fn force_into(&mut self, u: &[f64], force: &mut [f64], update: FailureUpdate) -> u64;
 
-    /// What the bonds of own sites cost that broke in the last force.
+    /// Returns the cost of the bonds of own sites that broke in the last force.
     fn lost(&self, at: &Halfway<'_>) -> LostToBreaks;
 
-    /// Adds what all processes lost to the account of [`super::SemiDiscrete::dissipation`].
+    /// Adds the losses of all processes to the account of [`super::SemiDiscrete::dissipation`].
     fn spend(&mut self, lost: &LostToBreaks);
 
     /// Collective: overwrites each number with the sum of those of all processes.
@@ -42,7 +42,7 @@ pub trait SharedSteps {
     /// Collective: overwrites the numbers of all sites with those of their processes.
     fn gather(&self, values: &mut [f64]);
 
-    /// Collective: breaks the bonds that other processes broke since they were told last.
+    /// Collective: breaks the bonds that other processes broke since this was called last.
     fn learn_breaks(&mut self);
 
     /// True where [`super::BodyState::damage_at_edge`] may find any, and asks for the bonds of all processes.

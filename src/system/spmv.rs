@@ -15,7 +15,7 @@ const ROWS: usize = ROW_CHUNK;
 /// Sites of a task that copies a number of each.
 const SITES: usize = 4096;
 
-/// Whether a task is to be done.
+/// Returns true if a task is to be done.
 fn is_marked(marked: Option<&[bool]>, chunk: usize) -> bool {
     marked.is_none_or(|marked| marked[chunk])
 }
@@ -73,7 +73,7 @@ fn of_row_differences<const D: usize>(k: &BlockCsr, i: usize, x: &[f64]) -> [f64
     sum
 }
 
-/// Which rows follow those before them, if most do.
+/// Returns true for each row that follows the one before it; none if few do.
 fn runs(k: &BlockCsr) -> Option<&[bool]> {
     let follows = k.shared.as_ref().map(|s| s.follows.as_slice());
     follows.filter(|f| 2 * f.iter().filter(|f| **f).count() > f.len())

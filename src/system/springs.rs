@@ -56,7 +56,7 @@ impl SpringRows {
         }
     }
 
-    /// Whether there are none.
+    /// Returns true if there are none.
     pub fn is_empty(&self) -> bool {
         self.sites.is_empty()
     }

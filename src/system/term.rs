@@ -2,7 +2,7 @@
 
 use super::{Interval, SpringRows};
 
-/// Bounds of what a term may add to the eigenvalues of the motion.
+/// Bounds of the part that a term may add to the eigenvalues of the motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RateBounds {
     /// Of `M⁻¹ K` that rest does not show \[1/s²\]: contact.
@@ -14,7 +14,7 @@ pub struct RateBounds {
 /// One term of the sum: springs to the ground, impactors, dashpots, loads that follow the body. It knows its own places, and neither the body nor other terms.
 ///
 /// Shapes: `u`, `force` and `sums` have the unknowns of all sites, those of the body first and then the term's own. Every method is required: a term that leaves a force, an energy or a bound out
-/// says so. A term that remembers keeps what it remembers behind a lock: the run and its records share it.
+/// says so. A term with a history keeps it behind a lock: the run and its records share it.
 pub trait ForceTerm: Send + Sync {
     /// Masses \[kg\] of the sites that the term has beside those of the body; empty for a term on the body alone. At most one term of a system has some.
     fn own_masses(&self) -> Vec<f64>;
@@ -50,7 +50,7 @@ pub trait ForceTerm: Send + Sync {
     /// Words of its memory for a checkpoint; empty for a term without memory.
     fn state(&self) -> Vec<u64>;
 
-    /// Puts back what [`ForceTerm::state`] gave; false if it belongs to another term.
+    /// Restores the state that [`ForceTerm::state`] gave; false if it belongs to another term.
     fn restore(&self, state: &[u64]) -> bool;
 }
 

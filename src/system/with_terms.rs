@@ -16,7 +16,7 @@ pub struct WithTerms<'t, S> {
     mass: Vec<f64>,
     /// Unknowns of the body.
     dofs: usize,
-    /// Displacement and interval of the last force; none if no term remembers.
+    /// Displacement and interval of the last force; none if no term has a history.
     last: Option<(Vec<f64>, Interval)>,
 }
 

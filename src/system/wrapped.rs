@@ -1,6 +1,6 @@
-//! What a system that wraps another one takes from it unchanged.
+//! Methods that a system that wraps another one takes from it unchanged.
 //!
-//! Most methods of [`SemiDiscrete`](super::SemiDiscrete) have a default, for bodies in which nothing breaks and no law remembers. A wrapper that left one out would have the
+//! Most methods of [`SemiDiscrete`](super::SemiDiscrete) have a default, for bodies in which nothing breaks and no law has a history. A wrapper that left one out would have the
 //! default in place of the answer of the body, so those that no wrapper changes stand here, once for all of them.
 
 /// Methods that neither a displacement nor the terms beside a body change, handed on to the field `$system`.
@@ -28,7 +28,7 @@ macro_rules! body_of {
     };
 }
 
-/// Methods of what a body remembers and of what has broken, handed on to the field `$system`.
+/// Methods of the history of a body and of its broken bonds, handed on to the field `$system`.
 macro_rules! state_of {
     ($system:ident) => {
         $crate::system::wrapped::body_of!($system);

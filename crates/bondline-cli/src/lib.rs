@@ -25,9 +25,9 @@ use command::interrupt::{self, INTERRUPTED};
 use command::threads::{self, Oversubscribe};
 use command::verify;
 
-/// Exit status of what went well.
+/// Exit status of success.
 const DONE: u8 = 0;
-/// Exit status of what is wrong or impossible.
+/// Exit status of a wrong or impossible request.
 const WRONG: u8 = 1;
 /// Exit status of a run that stopped where damage reached the edge of the nonlocal zone.
 const AT_EDGE: u8 = 3;
@@ -109,13 +109,13 @@ enum Command {
     Converge {
         #[command(flatten)]
         scene: SceneArguments,
-        /// What shrinks from level to level.
+        /// Lengths that shrink from level to level: horizon, spacing, or both.
         #[arg(long, value_enum, default_value = "delta")]
         kind: RefinementName,
         /// Number of levels, the scene itself the first.
         #[arg(long, value_name = "N", default_value_t = 3)]
         levels: usize,
-        /// By how much from level to level.
+        /// Factor by which they shrink from level to level.
         #[arg(long, value_name = "R", default_value_t = 2.0)]
         factor: f64,
         /// Folder for SCENE-KIND.svg and SCENE-KIND.csv, instead of the current one.
@@ -130,7 +130,7 @@ enum Command {
         /// The file to write.
         #[arg(default_value = "scene.toml")]
         path: PathBuf,
-        /// Which one.
+        /// Template of the new scene.
         #[arg(long, value_enum, default_value = "plate")]
         template: TemplateName,
     },
@@ -138,13 +138,13 @@ enum Command {
     Schema,
     /// List the fields of a solution that files and tables have, with their units and the keys that ask for them.
     Fields,
-    /// Run a scene with its knobs turned, and say what speed costs in accuracy.
+    /// Run a scene with its knobs turned, and show the cost of speed in accuracy.
     #[command(after_help = TRADE)]
     Trade(TradeArguments),
-    /// Measure what the code claims, as tables with limits; the exit status is 1 if any row is short.
+    /// Measure the claims of the code, as tables with limits; the exit status is 1 if any row is short.
     #[command(disable_help_flag = true)]
     Verify {
-        /// What the program bondline-verify takes; --help prints it.
+        /// Arguments of the program bondline-verify; --help prints them.
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<OsString>,
     },
@@ -185,10 +185,10 @@ struct TradeArguments {
     /// A key of the scene with other values: 'solver.tolerance=[1e-4, 1e-8]'.
     #[arg(long, value_name = "KEY=[...]", value_parser = pareto::typed)]
     vary: Vec<pareto::Knob>,
-    /// What is compared: displacement, strain, reaction, energy, history.COLUMN, path.TIP, tip-time.TIP; what suits the outputs if left out.
+    /// Quantities to compare: displacement, strain, reaction, energy, history.COLUMN, path.TIP, tip-time.TIP; those that suit the outputs if left out.
     #[arg(long = "quantity", value_name = "NAME", value_delimiter = ',', value_parser = pareto::Quantity::parse)]
     quantities: Vec<pareto::Quantity>,
-    /// What it is compared with: full peridynamics, or half the horizon and spacing; by default the first where cracks run, else the second.
+    /// Reference of the comparison: full peridynamics, or half the horizon and spacing; by default the first where cracks run, else the second.
     #[arg(long, value_enum)]
     reference: Option<ReferenceName>,
     /// A key of the reference, instead of --reference.
@@ -198,7 +198,7 @@ struct TradeArguments {
         conflicts_with = "reference"
     )]
     reference_keys: Vec<String>,
-    /// What a case costs.
+    /// Measure of the cost of a case.
     #[arg(long, value_enum, default_value = "time")]
     cost: CostName,
     /// Relative errors for which the cheapest case is wanted, and written as a scene.
@@ -272,7 +272,7 @@ enum TemplateName {
     LoadSteps,
 }
 
-/// Does what the arguments say, and returns the exit status; the first one is the name of the program.
+/// Carries out the command of the arguments, and returns the exit status; the first one is the name of the program.
 ///
 /// `program` starts this command line once more: studies run their scenes in programs of their own.
 pub fn command(
@@ -367,7 +367,7 @@ fn run(
     Ok(code)
 }
 
-/// Predicts a run, and what each of several processes would have of it.
+/// Predicts a run, and the part of it that each of several processes would have.
 fn check(
     scene: &SceneArguments,
     pilots: Option<f64>,
@@ -439,7 +439,7 @@ fn converge(
     Ok(())
 }
 
-/// Does what a command says.
+/// Carries out a command.
 fn execute(command: Command, program: std::io::Result<PathBuf>) -> miette::Result<u8> {
     memory::limit(command.memory());
     // these have several processes, or refuse them

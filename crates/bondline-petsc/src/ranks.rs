@@ -13,13 +13,13 @@ use crate::shim::{self, GhostVector, Product, System};
 /// Variables by which the starters of OpenMPI, MPICH, Intel MPI and PMIx tell a process that it is one of several.
 const STARTED: [&str; 4] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMI_RANK", "PMIX_RANK"];
 
-/// How long a process with an error waits for the first one to tell of it: most errors are those of all.
+/// Time for which a process with an error waits for the first process to report it: most errors occur on all of them.
 const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Exit status of a panic.
 const PANICKED: u8 = 101;
 
-/// Whether this process was started by `mpirun` or the like.
+/// Returns true if this process was started by `mpirun` or the like.
 pub fn is_under_mpi() -> bool {
     STARTED.iter().any(|name| std::env::var_os(name).is_some())
 }
@@ -69,7 +69,7 @@ impl PetscRanks {
         exit(i32::from(code))
     }
 
-    /// What no process can go on without.
+    /// Returns the value of a result; an error ends all processes.
     fn must<T>(&self, result: Result<T, String>) -> T {
         match result {
             Ok(value) => value,

@@ -86,10 +86,10 @@ unsafe extern "C" {
     fn bl_free(s: *mut Bl);
 }
 
-/// What `bl_parts` returns without PT-Scotch; no code of PETSc is negative.
+/// Return value of `bl_parts` without PT-Scotch; no error code of PETSc is negative.
 const NO_PARTITIONER: c_int = -1;
 
-/// What is told of a code of PETSc or MPI that is not zero.
+/// Turns a non-zero return code of PETSc or MPI into an error with its message.
 fn told(code: c_int) -> Result<(), String> {
     if code == 0 {
         return Ok(());
@@ -281,7 +281,7 @@ impl Drop for GhostVector {
 /// Overwrites the second with the own rows times the first, numbers of this rank; collective.
 pub type Product<'a> = dyn FnMut(&[f64], &mut [f64]) + Send + 'a;
 
-/// What PETSc calls for a product.
+/// Matrix–vector product that PETSc calls.
 struct Callback<'a> {
     dofs: usize,
     product: Box<Product<'a>>,

@@ -16,13 +16,13 @@ use pyo3::prelude::*;
 
 use crate::errors::defect;
 
-/// How often signals are looked for, and progress is shown.
+/// Interval at which signals are looked for, and progress is shown.
 const TICK: Duration = Duration::from_millis(50);
 
 /// Stack of the computation, as large as that of a program's first thread.
 const STACK: usize = 8 << 20;
 
-/// What the stack is unwound with when a computation is cancelled.
+/// Payload with which the stack is unwound when a computation is cancelled.
 struct Cancelled;
 
 enum Message<T> {
@@ -152,7 +152,7 @@ impl<T: Send> Observer for Outlet<T> {
     }
 }
 
-/// What becomes of a computation when a signal asks for its end.
+/// Reaction of a computation to a signal that asks for its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// It ends where it next reports progress, or after its step. A second signal gives it up.
@@ -242,7 +242,7 @@ fn show(watched: &Watched, progress: &Bound<'_, PyAny>, told: &mut (String, u64)
     Ok(())
 }
 
-/// Why a thread ended without a result.
+/// Returns the exception for a thread that ended without a result.
 fn unwound(py: Python<'_>, thread: JoinHandle<()>, raised: Option<PyErr>) -> PyErr {
     let payload = match py.detach(move || thread.join()) {
         Ok(()) => return raised.unwrap_or_else(|| defect(py, "the computation gave no result")),

@@ -61,7 +61,7 @@ pub fn run_error(py: Python<'_>, error: &RunError) -> PyErr {
     exception(py, "RunError", &text, message, error.place(), help)
 }
 
-/// Why nothing can be predicted.
+/// Turns the error of a check into an exception.
 pub fn check_error(py: Python<'_>, error: CheckError) -> PyErr {
     match error {
         CheckError::Scene(error) => scene_error(py, *error),

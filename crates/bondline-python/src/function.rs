@@ -10,11 +10,11 @@ use pyo3::types::PyDict;
 
 use crate::errors::value_error;
 
-/// What the parameters of a function may be called: coordinates and the time.
+/// Names that the parameters of a function may have: coordinates and the time.
 const NAMES: [&str; 4] = ["x", "y", "z", "t"];
 const TIME: usize = 3;
 
-/// What a function raised first. A field has no errors, only numbers, so that it is kept until the computation has ended.
+/// First exception that a function raised. A field has no errors, only numbers, so that it is kept until the computation has ended.
 #[derive(Clone, Debug, Default)]
 pub struct Raised(Arc<Mutex<Option<PyErr>>>);
 
@@ -24,7 +24,7 @@ impl Raised {
         kept.get_or_insert(error);
     }
 
-    /// What a computation gave, unless one of its functions raised an exception.
+    /// Returns the result of a computation, unless one of its functions raised an exception.
     ///
     /// # Errors
     /// That exception, once.
@@ -40,9 +40,9 @@ impl Raised {
 /// The functions of a scene, in the order of their words.
 #[derive(Debug, Default)]
 pub struct Functions {
-    /// What the scene's source takes.
+    /// The functions as the scene's source takes them.
     pub list: Vec<Function>,
-    /// What they raise.
+    /// Exceptions that they raise.
     pub raised: Raised,
 }
 
@@ -76,7 +76,7 @@ impl Functions {
     }
 }
 
-/// Which of [`NAMES`] a function takes.
+/// Returns true for each of [`NAMES`] that a function takes.
 fn parameters(callable: &Bound<'_, PyAny>, place: &str) -> PyResult<[bool; 4]> {
     let py = callable.py();
     let help = "write a function of any of x, y, z and t, `lambda x, t: 1e6 * x * t`";

@@ -1,6 +1,6 @@
 //! The native half of the Python package `bondline`: scenes, runs and their results as numpy arrays.
 //!
-//! What users import is the Python half in `python/bondline`; it alone documents the interface. Nothing here solves or writes: this crate hands scenes to the library
+//! Users import the Python half in `python/bondline`; it alone documents the interface. Nothing here solves or writes: this crate hands scenes to the library
 //! and results back.
 //!
 //! | file | what |

@@ -13,7 +13,7 @@ type Sets<'py> = Vec<(String, PyReadonlyArray1<'py, u64>)>;
 /// A mesh in memory.
 #[pyclass(frozen, module = "bondline._bondline")]
 pub struct Mesh {
-    /// What a scene takes.
+    /// The mesh as a scene takes it.
     pub parts: Arc<MeshParts>,
 }
 

@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 #[global_allocator]
 static ALLOCATOR: Allocator = Allocator;
 
-/// Does what the arguments say and returns the exit status; `program` starts the command line once more.
+/// Carries out the command of the arguments and returns the exit status; `program` starts the command line once more.
 #[pyfunction]
 pub fn command(py: Python<'_>, program: PathBuf, arguments: Vec<OsString>) -> u8 {
     py.detach(|| bondline_cli::command(Ok(program), arguments))

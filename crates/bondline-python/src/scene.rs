@@ -96,7 +96,7 @@ impl Scene {
         Self::validated(keys.py(), source, directory, name)
     }
 
-    /// Whether the scene has a history.
+    /// Returns true if the scene has a history in time.
     #[getter]
     fn moves(&self) -> bool {
         self.scene.moves()

@@ -16,7 +16,7 @@ use bondline::{
     regular_file,
 };
 
-/// What shrinks from level to level. Source: \[Bobaru2009\] section 3.
+/// Lengths that shrink from level to level. Source: \[Bobaru2009\] section 3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refinement {
     /// δ-convergence: the horizon and the spacing shrink together, `m = δ/h` stays.
@@ -50,11 +50,11 @@ impl Refinement {
 /// A study of one scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConvergeParams {
-    /// What shrinks.
+    /// Kind of refinement.
     pub refinement: Refinement,
     /// Number of levels, the scene itself the first; at least 2, and 3 for an order.
     pub levels: usize,
-    /// By how much from level to level, more than 1.
+    /// Factor of refinement from level to level, more than 1.
     pub factor: f64,
 }
 
@@ -73,10 +73,10 @@ pub struct Level {
     pub largest: Option<f64>,
 }
 
-/// What a study gave.
+/// Results of a convergence study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Converged {
-    /// What shrank.
+    /// Kind of refinement.
     pub refinement: Refinement,
     /// The levels, coarse to fine.
     pub levels: Vec<Level>,
@@ -84,7 +84,7 @@ pub struct Converged {
     pub samples: usize,
 }
 
-/// Why there is no study.
+/// Failure of a convergence study.
 #[derive(Debug, thiserror::Error)]
 pub enum ConvergeError {
     /// The scene.
@@ -325,7 +325,7 @@ fn compare(refinement: Refinement, solved: &[Samples]) -> Result<Converged, Conv
 }
 
 impl Converged {
-    /// What is plotted along x: the spacing, or the horizon where it shrinks.
+    /// Returns the abscissa of a level in the plot: its spacing, or its horizon where that shrinks.
     fn size(&self, level: &Level) -> f64 {
         match self.refinement {
             Refinement::M => level.spacing,

@@ -1,12 +1,12 @@
-//! Many runs of a scene: what one will need, how large its error is, and what leaves the least error for the time.
+//! Many runs of a scene: the predicted cost of one, its error, and the settings of least error for the time.
 //!
 //! | file | what |
 //! |---|---|
-//! | `load.rs` | a scene from its file, with what its `accuracy` leaves open |
-//! | `variants/` | the scene with another value of a key, and how far outputs are apart |
-//! | `accuracy/` | what a scene leaves open, chosen for the error that it wants; errors predicted |
+//! | `load.rs` | a scene from its file, with the choices of its `accuracy` |
+//! | `variants/` | the scene with another value of a key, and the differences of outputs |
+//! | `accuracy/` | parameters that a scene leaves open, chosen for the error that it wants; errors predicted |
 //! | `converge.rs` | one scene at several refinements |
-//! | `pareto/` | what speed costs in accuracy |
+//! | `pareto/` | cost against accuracy |
 //! | `line_plot.rs`, `field_plot.rs` | line plots and coloured fields as SVG |
 
 pub mod accuracy;

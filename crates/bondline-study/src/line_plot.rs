@@ -20,7 +20,7 @@ use plotters::style::{Color, FontStyle, ShapeStyle, TextStyle, register_font};
 use bondline::observe::ObserveError;
 use bondline::observe::atomic_file::write_whole;
 
-/// How an axis is divided.
+/// Scale of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
     /// In equal steps.
@@ -30,7 +30,7 @@ pub enum Scale {
     Log,
 }
 
-/// How a series is drawn.
+/// Style of a series.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stroke {
     /// A line.
@@ -47,13 +47,13 @@ pub enum Stroke {
 /// A named series of points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// What the legend says; a series without a name is not in it.
+    /// Name in the legend; a series without a name is not in it.
     pub name: String,
     /// Points in the order in which a line joins them.
     pub points: Vec<(f64, f64)>,
-    /// How it is drawn.
+    /// Style in which it is drawn.
     pub stroke: Stroke,
-    /// What stands beside each point; empty if nothing does.
+    /// Labels beside the points; empty if there are none.
     pub labels: Vec<String>,
 }
 
@@ -88,7 +88,7 @@ pub struct LinePlot {
     pub x_scale: Scale,
     /// Division of the vertical axis.
     pub y_scale: Scale,
-    /// What is drawn, later ones on top.
+    /// The series, later ones on top.
     pub series: Vec<Series>,
 }
 

@@ -1,4 +1,4 @@
-//! Scenes from files and texts; what an `accuracy` leaves open is chosen.
+//! Scenes from files and texts; the parameters that an `accuracy` leaves open are chosen.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What the programs of bondline share, and the library does without: the process around a computation, and the person who waits for it.
+//! Parts that the programs of bondline share, and the library does without: the process around a computation, and the person who waits for it.
 //!
 //! | file | what |
 //! |---|---|

@@ -116,10 +116,10 @@ fn installed() -> Option<u64> {
     Some(group.map_or(machine, |group: u64| group.min(machine)))
 }
 
-/// A size of memory: 4GiB, 500MB, 1.5G.
+/// Reads a size of memory \[bytes\]: 4GiB, 500MB, 1.5G.
 ///
 /// # Errors
-/// What to write instead.
+/// A message with the spelling that is understood.
 pub fn size(text: &str) -> Result<u64, String> {
     let wrong = || format!("`{text}` is no size of memory; write 500MB, 4GiB or 1.5G");
     let trimmed = text.trim();

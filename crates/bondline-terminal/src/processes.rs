@@ -22,7 +22,7 @@ fn started() -> Option<(usize, usize)> {
 /// Refuses several processes for what one has to do alone.
 ///
 /// # Errors
-/// Where `mpirun` has started several; those after the first wait, so that it is told of once.
+/// Fails if `mpirun` has started several; those after the first wait, so that the error is reported once.
 pub fn refuse_several() -> miette::Result<()> {
     match started() {
         Some((rank, count)) if count > 1 => {
@@ -38,7 +38,7 @@ pub fn refuse_several() -> miette::Result<()> {
     }
 }
 
-/// How long processes after the first wait for its message, which ends them.
+/// Time for which processes after the first wait for its message, which ends them.
 const PATIENCE: std::time::Duration = std::time::Duration::from_secs(2);
 
 #[cfg(feature = "petsc")]
@@ -55,7 +55,7 @@ mod petsc {
         /// Starts MPI, where there is any.
         ///
         /// # Errors
-        /// Where it does not start.
+        /// Fails if MPI does not start.
         pub fn start() -> miette::Result<Self> {
             if !is_under_mpi() {
                 return Ok(Self(None));
@@ -111,7 +111,7 @@ mod alone {
         /// Nothing is to be started.
         ///
         /// # Errors
-        /// Where `mpirun` has started several, of which each would run the whole scene.
+        /// Fails if `mpirun` has started several, of which each would run the whole scene.
         pub fn start() -> miette::Result<Self> {
             match super::started() {
                 Some((_, count)) if count > 1 => Err(miette::miette!(

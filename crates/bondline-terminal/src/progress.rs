@@ -78,7 +78,7 @@ impl TerminalProgress {
     }
 }
 
-/// What stays of a stage: its name, its seconds, and its share where it stopped short.
+/// Returns the line that stays of a stage: its name, its seconds, and its share where it stopped short.
 fn record(bar: &ProgressBar) -> String {
     let seconds = bar.elapsed().as_secs_f64();
     let done = match bar.length() {

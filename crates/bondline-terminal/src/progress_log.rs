@@ -1,4 +1,4 @@
-//! Progress as plain lines for a file or a pipe: now and then one that says how the stage stands, and none in a short run.
+//! Progress as plain lines for a file or a pipe: now and then one on the state of the stage, and none in a short run.
 
 use std::io::Write;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -32,11 +32,11 @@ struct Stage<W> {
     name: String,
     total: Option<u64>,
     message: String,
-    /// When the stage began.
+    /// Begin of the stage.
     begun: Instant,
-    /// When the run began.
+    /// Begin of the run.
     run_begun: Instant,
-    /// When a line was written last, or the run began.
+    /// Time of the last line, or begin of the run.
     told: Instant,
 }
 
@@ -87,7 +87,7 @@ impl<W: Write + Send> ProgressLog<W> {
 }
 
 impl<W> Stage<W> {
-    /// How the stage stands.
+    /// Returns a line on the progress of the stage.
     fn line(&self, done: u64, now: Instant) -> String {
         let gone = (now - self.begun).as_secs_f64();
         let mut line = format!("{}: ", self.name);

@@ -31,14 +31,14 @@ pub struct Umat {
     elastic: Tensor4<3>,
     history: &'static [&'static str],
     failure: Mutex<Option<String>>,
-    /// Whether the routine has called `XIT`.
+    /// True once the routine has called `XIT`.
     is_over: AtomicBool,
 }
 
 /// Components in the order of Abaqus.
 const COMPONENTS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
-/// Where each part of the history begins, and names of its numbers before `STATEV`.
+/// Offsets of the parts of the history, and names of its numbers before `STATEV`.
 const STRESS: usize = 9;
 const STRAIN: usize = 15;
 const ENERGIES: usize = 21;
@@ -107,7 +107,7 @@ fn columns(t: &Tensor<3>) -> [f64; 9] {
     std::array::from_fn(|k| t[(k % 3, k / 3)])
 }
 
-/// How a step deforms the material.
+/// Deformation of the material within a step.
 struct Increment {
     /// `sym L` of the step.
     change: Tensor<3>,
@@ -129,7 +129,7 @@ impl Umat {
         }
     }
 
-    /// How a step deforms the material; none where it is turned inside out.
+    /// Returns the deformation of the material within a step; none where it is turned inside out.
     fn increment(&self, before: &Tensor<3>, after: &Tensor<3>) -> Option<Increment> {
         let identity = Tensor::identity();
         if !self.settings.is_large {
@@ -159,7 +159,7 @@ impl Umat {
         0.5 * stress.dot(&elastic)
     }
 
-    /// What is stored at the end of a step and what was dissipated within it, per undeformed volume; `energies` are those that the routine gave, `stress` is that before, turned, and after.
+    /// Returns the energy stored at the end of a step and that dissipated within it, per undeformed volume; `energies` are those that the routine gave, `stress` is that before, turned, and after.
     fn energies(
         &self,
         past: &[f64],
@@ -209,7 +209,7 @@ impl Umat {
         }
     }
 
-    /// Notes what failed.
+    /// Records a failure.
     fn note(&self, call: &Call<'_>, what: &str, remedy: &str) {
         let strain: Vec<String> = (call.strain.iter().zip(&call.change))
             .map(|(e, d)| format!("{:.4e}", e + d))
@@ -227,7 +227,7 @@ impl Umat {
         *failure = Some(message);
     }
 
-    /// Calls the routine; `states` is `STATEV`, before and after. None where nothing can be had of it, which is noted.
+    /// Calls the routine; `states` is `STATEV`, before and after. None where it fails, which is recorded.
     fn called(
         &self,
         gradient: &Tensor<3>,
@@ -338,7 +338,7 @@ impl Umat {
         tangent
     }
 
-    /// What is wrong with what a call gave, and the remedy.
+    /// Returns the fault of the results of a call, and the remedy; none if they are sound.
     fn wrong(&self, call: &Call<'_>) -> Option<(String, &'static str)> {
         let is_finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
         if self.routine.has_given_up() {
@@ -371,7 +371,7 @@ impl Umat {
     }
 }
 
-/// What a routine gave for an increment, and what it was given.
+/// Results of a routine for an increment, and its input.
 struct Called {
     increment: Increment,
     /// Stress and strain before, turned.
@@ -393,7 +393,7 @@ const NOT_A_NUMBER: LocalResponse<3> = LocalResponse {
     dissipated: f64::NAN,
 };
 
-/// Numbers behind `STATEV` that no routine has to write to, and what they are.
+/// Number of guard entries behind `STATEV` that no routine may write to, and their value.
 const GUARDS: usize = 64;
 const GUARD: f64 = -7.306_172_948e-289;
 

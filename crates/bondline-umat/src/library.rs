@@ -78,7 +78,7 @@ pub struct Routine {
     path: PathBuf,
 }
 
-/// What a call takes and gives; stresses and strains in the order 11, 22, 33, 12, 13, 23, shears those of engineering, tensors by columns.
+/// Arguments and results of a call; stresses and strains in the order 11, 22, 33, 12, 13, 23, shears those of engineering, tensors by columns.
 pub(crate) struct Call<'a> {
     /// `STRESS` \[Pa\], Cauchy.
     pub stress: [f64; 6],
@@ -173,7 +173,7 @@ impl Routine {
         &self.path
     }
 
-    /// Whether the routine has called `XIT`.
+    /// Returns true if the routine has called `XIT`.
     pub(crate) fn has_given_up(&self) -> bool {
         self.flag
             .is_some_and(|flag| flag.load(Ordering::Relaxed) != 0)

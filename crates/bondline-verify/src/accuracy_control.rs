@@ -1,5 +1,5 @@
-//! What `accuracy` chooses in a set of small scenes (`examples/choices`): whether the error is met, what it costs over the cheapest
-//! candidate that meets it, and how near the predictions of error and time are.
+//! Choices of `accuracy` in a set of small scenes (`examples/choices`): if the error is met, the cost over that of the cheapest
+//! candidate that meets it, and the accuracy of the predictions of error and time.
 //!
 //! Errors are against a finer run: elements alone where nothing is cut, peridynamics everywhere with the same horizon and more points where
 //! cracks are. Constants of the choice (`crates/bondline-study/src/accuracy/estimate.rs`) come from the calibration half only.
@@ -24,7 +24,7 @@ pub const COST_LIMIT: f64 = 1.5;
 /// Predicted over measured time, or its inverse.
 pub const TIME_LIMIT: f64 = 1.5;
 
-/// Which half a scene belongs to.
+/// Half that a scene belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Half {
     Calibration,
@@ -96,7 +96,7 @@ const CASES: &[Case] = &[
     case!("wave_plate", Calibration, LARGE, 4.0),
 ];
 
-/// What came of one scene and one wanted error.
+/// Outcome of one scene and one wanted error.
 #[derive(Clone, Debug)]
 struct Outcome {
     half: Half,
@@ -108,7 +108,7 @@ struct Outcome {
     checked: Checked,
 }
 
-/// What `check` would say of the chosen scene, had it been typed: errors, `None` where it does not predict one.
+/// Error that `check` would predict for the chosen scene, had it been typed; `None` where it does not predict one.
 #[derive(Clone, Copy, Debug, Default)]
 struct Checked {
     /// As it does.
@@ -124,7 +124,7 @@ const SWEEP: [f64; 4] = [0.5, 0.65, 0.8, 0.9];
 const LONG: f64 = 0.1;
 const MOST_RUNS: usize = 10;
 
-/// The keys of a candidate and what its runs took.
+/// The keys of a candidate, and the cost of its runs.
 struct Timed {
     keys: Vec<String>,
     least: f64,
@@ -457,7 +457,7 @@ mod tests {
         assert_eq!(timed.map(|t| t.least), [0.001, 0.05]);
     }
 
-    /// What is typed stays: here the mesh, so that nothing is left to choose but the coupling.
+    /// Typed keys stay: here the mesh, so that nothing is left to choose but the coupling.
     #[test]
     fn typed_keys_stay() {
         let mut source = source(&CASES[0], 0.01).unwrap();

@@ -33,7 +33,7 @@ pub const EQUILIBRIUM_LIMIT: f64 = 1e-12;
 /// Largest relative distance from the leading term.
 pub const LEADING_TERM_LIMIT: f64 = 0.01;
 
-/// How much smaller the spurious force of a site has to be for a smooth β over 3δ than for a splice.
+/// Factor by which the spurious force of a site has to be smaller for a smooth β over 3δ than for a splice.
 pub const SPURIOUS_RATIO: f64 = 100.0;
 
 /// Half of the peridynamic zone in spacings: so far from the origin that the third derivative of `x⁴` varies little across a seam.
@@ -252,7 +252,7 @@ pub fn leading_terms(effort: Effort, progress: &dyn Progress, ranks: Option<&dyn
     table
 }
 
-/// Whether a method leaves no force out of balance in 1D under a field of that degree; a wide β shifts the place of a splice's force against that of a blending's.
+/// Returns true if a method leaves no force out of balance in 1D under a field of that degree; a wide β shifts the place of a splice's force against that of a blending's.
 fn is_in_balance(method: Method, degree: u32) -> bool {
     match method {
         Method::Truncated | Method::Balanced => true,

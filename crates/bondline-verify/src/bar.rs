@@ -32,7 +32,7 @@ pub const EXACT: f64 = 1e-9;
 /// Plane means of the bar in three dimensions, relative to the largest displacement.
 pub const PLANE_MEANS: f64 = 5e-3;
 
-/// What encloses the peridynamic zone of the bar in three dimensions sideways: transition 2h and finite elements 4h thick
+/// Enclosure of the peridynamic zone of the bar in three dimensions sideways: transition 2h and finite elements 4h thick
 /// (two horizons, as a state-based law at the rim of a blending or meshfree region reaches that far).
 pub const ENCLOSED: &[&str] = &[
     "mesh.box.min=[-0.020, -0.0085, -0.0085]",
@@ -67,7 +67,7 @@ pub const METHODS: [(&str, &[&str]); 6] = [
     ),
 ];
 
-/// Why a bar was not solved.
+/// Failure of the solution of a bar.
 #[derive(Debug)]
 pub enum BarError {
     /// Its scene.
@@ -169,7 +169,7 @@ pub fn solve(scene: AnyScene, progress: &dyn Progress) -> Result<Bar, RunError> 
     solve_and(scene, Write::Nothing, progress)
 }
 
-/// Whether a scene's outputs are written.
+/// Output of the files of a scene: on or off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Write {
     /// They are not.
@@ -303,7 +303,7 @@ pub fn model_name(zone: Zone) -> &'static str {
     }
 }
 
-/// What the rows of a bar have to keep.
+/// Displacement that is expected of a bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Expected {
     /// The straight line at every site, to [`EXACT`].
@@ -479,7 +479,7 @@ pub fn figures(folder: &Path, progress: &dyn Progress) -> Result<(), FigureError
     Ok(())
 }
 
-/// Why a figure could not be made.
+/// Failure to draw a figure.
 #[derive(Debug)]
 pub enum FigureError {
     /// The bar.

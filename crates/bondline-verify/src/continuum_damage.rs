@@ -17,7 +17,7 @@ use bondline_study::line_plot::{LinePlot, Series, Stroke};
 /// Largest error of the stress of the bar, over its largest stress.
 pub const STRESS_LIMIT: f64 = 1e-8;
 
-/// How far a crack reaches from the hole once the plate is cracked through: to the last point of 15 \[mm\].
+/// Length of a crack from the hole once the plate is cracked through: to the last point of 15 \[mm\].
 pub const THROUGH: f64 = 14.0;
 
 /// Nominal strains at which the report shows the plate: stable damage, and cracked through.
@@ -79,7 +79,7 @@ fn plate(
     ))
 }
 
-/// How far points of a level of damage lie from the hole at a nominal strain, along the ligament \[mm\]; 0 if there are none.
+/// Returns the largest distance from the hole of points of a level of damage at a nominal strain, along the ligament \[mm\]; 0 if there are none.
 fn extent(seen: &Seen, level: &str, strain: f64) -> f64 {
     let rows = seen.columns(level, ["time", "x"]);
     let until = rows
@@ -203,10 +203,10 @@ fn with_elements(material: &str, spacing: f64) -> Result<Seen, String> {
     plate(material, [spacing, 2.0 * spacing], "truncated", &zones)
 }
 
-/// Draws figure 6.2, how far damage and cracks reach from the hole by the nominal strain, as `damaged_plate.svg`.
+/// Draws figure 6.2, the extent of damage and cracks from the hole over the nominal strain, as `damaged_plate.svg`.
 ///
 /// # Errors
-/// What a run says, or the file.
+/// The message of a failed run, or of the file.
 pub fn figures(folder: &Path, progress: &dyn Progress) -> Result<Vec<PathBuf>, String> {
     progress.stage("damaged plates", Some(4));
     let mut series = Vec::new();

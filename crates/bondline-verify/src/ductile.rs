@@ -153,13 +153,13 @@ fn work(spacing: f64) -> u64 {
     (10.0 / spacing.powi(4)).ceil() as u64
 }
 
-/// What a bar did.
+/// Results of a bar.
 struct Pulled {
     /// Largest load \[kN\], and the nominal strain there.
     peak: [f64; 2],
     /// Load \[kN\] and nominal strain when the first bond breaks.
     first: [f64; 2],
-    /// How far from the axis the first damage is \[mm\].
+    /// Distance of the first damage from the axis \[mm\].
     from_axis: f64,
     /// Largest share of the work that is not accounted for from a tenth of the run on.
     missing: f64,
@@ -260,7 +260,7 @@ fn alone([spacing, drag, left_limit]: [f64; 3], reference: &[[f64; 2]], largest:
     table
 }
 
-/// The suite `ductile`. Each table is also told when its bar has torn: the finest take most of an hour.
+/// The suite `ductile`. Each table is also reported once its bar has torn: the finest take most of an hour.
 pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     let (bars, coupled_bars) = match effort {
         Effort::Quick => (&BARS[..1], &COUPLED_BARS[..1]),

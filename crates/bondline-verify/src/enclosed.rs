@@ -61,7 +61,7 @@ impl Cells {
         }
     }
 
-    /// Whether the elements are aligned to the lattice.
+    /// Returns true if the elements are aligned to the lattice.
     pub fn is_aligned(self) -> bool {
         matches!(self, Self::Matching | Self::Coarse | Self::Aligned(_))
     }
@@ -95,7 +95,7 @@ impl Widths {
     }
 }
 
-/// What is measured in one row.
+/// Method, law, elements and zones of one row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Case {
     /// The method.
@@ -110,7 +110,7 @@ pub struct Case {
     pub ratio: u32,
 }
 
-/// Why a case was not built.
+/// Failure to build a case.
 #[derive(Debug, thiserror::Error)]
 pub enum EnclosedError {
     /// The mesh of its file.
@@ -125,13 +125,13 @@ pub enum EnclosedError {
 pub struct Enclosed<const D: usize> {
     /// Its sites.
     pub model: Model<D>,
-    /// How its models are joined.
+    /// Coupling of its models.
     pub coupling: Box<dyn Coupling<D>>,
     /// Its stiffness.
     pub stiffness: BlockCsr,
-    /// What the rows of the stiffness are.
+    /// Volumes of which the rows of the stiffness are equations.
     pub rows: Rows,
-    /// Which process assembled which rows, where several did.
+    /// Rows by process, where several assembled them.
     pub shared: Option<SharedRows>,
     /// Half the width of the block \[m\].
     pub half: f64,
@@ -142,13 +142,13 @@ pub struct Enclosed<const D: usize> {
 /// Rows that several processes assembled, each those of its own sites.
 #[derive(Clone, Debug)]
 pub struct SharedRows {
-    /// Which process has which sites.
+    /// Partition of the sites over the processes.
     pub partition: Partition,
     /// The rows of this process, ascending by site.
     pub own: BlockCsr,
 }
 
-/// Which volume the rows of a stiffness are equations of.
+/// Volumes of which the rows of a stiffness are equations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rows {
     /// Each that of its own row, as the operator writes it; their sums hold.
@@ -157,7 +157,7 @@ pub enum Rows {
     OfSites,
 }
 
-/// What a block has otherwise than its case says.
+/// Settings of a block beyond those of its case.
 #[derive(Clone, Debug, Default)]
 pub struct Otherwise<'a> {
     /// The coupling as a scene types it, on the lattice of the case.
@@ -267,12 +267,12 @@ impl<const D: usize> Enclosed<D> {
         })
     }
 
-    /// Whether a site lies on the outer boundary.
+    /// Returns true if a site lies on the outer boundary.
     pub fn is_outer(&self, site: usize) -> bool {
         self.model.sites[site].position.amax() > self.half * (1.0 - 1e-9)
     }
 
-    /// What makes of the force in the row of a site one per volume.
+    /// Returns the factor that turns the force in the row of a site into one per volume.
     pub fn per_volume(&self, site: usize) -> f64 {
         let scale = self.model.row_scale().filter(|_| self.rows == Rows::Own);
         scale.map_or(1.0, |scale| scale[site]) / self.model.sites[site].volume

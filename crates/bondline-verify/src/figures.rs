@@ -33,7 +33,7 @@ fn within(folder: &Path, names: &[&str]) -> Vec<PathBuf> {
     names.iter().map(|name| folder.join(name)).collect()
 }
 
-/// How the figures of a suite are drawn; none if it has none.
+/// Returns the function that draws the figures of a suite; none if it has none.
 pub fn figures(suite: &str) -> Option<Draw> {
     let found = FIGURES.iter().find(|(name, _)| *name == suite);
     found.map(|(_, draw)| *draw)

@@ -1,4 +1,4 @@
-//! Interfaces of two materials: what opening one costs, and whether a crack that meets one at a right angle turns into it or goes through.
+//! Interfaces of two materials: the work to open one, and the path of a crack that meets one at a right angle: along it, or through it.
 //!
 //! A crack in one of two materials of equal elasticity ends at their interface, normal to it. The energy release rate of a crack that turns along the interface is about 0.26 of that of one that goes on straight
 //! \[HeHutchinson1989\], so it turns where the toughness of the interface is below that part of the toughness of the material behind.
@@ -20,7 +20,7 @@ pub const BOUNDS: [f64; 2] = [0.20, 0.30];
 /// Largest difference of the ratio of a coupled plate from that of full peridynamics.
 pub const COUPLED_LIMIT: f64 = 0.05;
 
-/// Largest relative difference of what an interface takes from the energy that was typed.
+/// Largest relative difference of the energy that an interface takes from the one that was typed.
 pub const PLANE_LIMIT: f64 = 0.02;
 
 /// Fracture energy, with E and the spacing one.
@@ -58,7 +58,7 @@ pub fn opening(law: &str, moduli: [f64; 2]) -> Result<f64, String> {
     Ok((of(3)? - of(2)?) / (3.0 * ENERGY))
 }
 
-/// Which way a crack goes.
+/// Path of a crack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
     /// Along the interface.
@@ -112,7 +112,7 @@ fn first_step(table: Option<&String>) -> f64 {
         .unwrap_or(f64::INFINITY)
 }
 
-/// Where a crack goes first by more than a horizon.
+/// Returns the way that a crack takes first by more than a horizon.
 ///
 /// # Errors
 /// The message of a refusal.
@@ -212,7 +212,7 @@ fn cracks(effort: Effort) -> Table {
     table
 }
 
-/// What interfaces take, and where cracks go that meet one.
+/// Runs the openings of interfaces, and the cracks that meet one.
 pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     progress.stage("interfaces pulled apart", None);
     let openings = openings(effort);

@@ -138,7 +138,7 @@ fn text(body: &Body, law: &str, coupling: &str) -> String {
     )
 }
 
-/// What one case shows.
+/// Results of one case.
 #[derive(Clone, Copy, Debug)]
 pub struct Found {
     /// Largest internal force of a site inside, per volume over E|G|/h.

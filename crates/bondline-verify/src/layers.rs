@@ -121,7 +121,7 @@ pub fn properties(effort: Effort, progress: &dyn Progress) -> Table {
     table
 }
 
-/// How two horizons meet along a bar.
+/// Junction of two horizons along a bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Meeting {
     /// A layer of elements, so many larger spacings thick.
@@ -224,7 +224,7 @@ fn bar(meeting: Meeting, half: u32, ratio: u32) -> Result<(LinearMotion, Vec<f64
     Ok((motion, x, ghost))
 }
 
-/// What is left, on the left, of a pulse `exp(−(x/w)²)` that went right past 0: displacement by position in thousandths.
+/// Returns the displacement left behind, on the left, by a pulse `exp(−(x/w)²)` that went right past 0, by position in thousandths.
 fn left_behind(
     (motion, x, _): &mut (LinearMotion, Vec<f64>, f64),
     half: u32,
@@ -284,7 +284,7 @@ fn reflected(meeting: Meeting, width: u32, ratio: u32) -> Result<[f64; 2], Strin
     Ok([amplitude, ghost])
 }
 
-/// What two horizons send back of a pulse that comes from the larger one.
+/// Measures the part of a pulse that two horizons reflect, from the larger one.
 pub fn reflection(effort: Effort, progress: &dyn Progress) -> Table {
     progress.stage("reflection at a layer", None);
     let mut table = Table::new(

@@ -1,10 +1,10 @@
-//! Suites that measure what the code claims: exact fields, error norms, and tables of figures with their limits.
+//! Suites that measure the claims of the code: exact fields, error norms, and tables of figures with their limits.
 //!
-//! | suite | what it measures |
+//! | suite | measurements |
 //! |---|---|
 //! | `patch` | affine fields through the seam: residual, solution, out-of-balance force |
 //! | `balance` | the out-of-balance force of a seam against its leading term |
-//! | `truncated` | truncated bonds: symmetry, definiteness, affine fields, equilibrium, order in δ, what symmetry saves |
+//! | `truncated` | truncated bonds: symmetry, definiteness, affine fields, equilibrium, order in δ, savings by symmetry |
 //! | `seams` | cracks and waves in the plane beside every method, conditions of seams that do not follow the lattice |
 //! | `skin` | bars with free sides, with a skin of elements and without |
 //! | `softening` | softening bonds: a notched strip pulled to separation, a notched beam in three-point bending |
@@ -21,7 +21,7 @@
 //! | `convergence` | the studies of [SAND2015-7998] chapter 5 |
 //! | `variable-horizon` | the bar of [SAND2015-7998] section 7.2 |
 //! | `horizons` | ways to change the horizon: ghost force, pairs, reflection, eight passes |
-//! | `choices` | what `accuracy` chooses in small scenes, against finer runs |
+//! | `choices` | choices of `accuracy` in small scenes, against finer runs |
 //! | `scale` | static solves of up to a million unknowns: iterations, time, memory |
 //! | `bobaru` | the tables of \[Bobaru2009\] |
 //! | `meshes` | scenes as people type them, on meshes that fit nothing |
@@ -29,7 +29,7 @@
 //! | `estimates` | the estimates of [SAND2015-7998] chapters 2 and 3, and the ghost strain of figure 2.1 |
 //! | `emmrich-weckner` | the nonlocal bar of \[EmmrichWeckner2007\] |
 //! | `wave` | energy and momentum over 100 000 steps |
-//! | `reflection` | what a seam sends back of a pulse |
+//! | `reflection` | part of a pulse that a seam reflects |
 //! | `extremes` | units, places, laws, shapes and steps at their limits |
 //! | `spectrum` | eigenvalues of coupled models that move, and their stable step; `strip.rs` is their scene |
 //!
@@ -81,7 +81,7 @@ pub use weights::weights;
 use bondline::{observe::report::Table, progress::Progress, system::Ranks};
 use rayon::prelude::*;
 
-/// How much of a suite is run.
+/// Extent to which a suite is run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
     /// Every method, law and dimension at least once, in seconds.
@@ -95,7 +95,7 @@ pub enum Effort {
 pub struct Suite {
     /// Its name on the command line.
     pub name: &'static str,
-    /// What it measures, in one line.
+    /// Quantity that it measures, in one line.
     pub about: &'static str,
     /// Runs it.
     pub run: fn(Effort, &dyn Progress) -> Vec<Table>,
@@ -115,7 +115,7 @@ fn tell(table: &Table, effort: Effort, progress: &dyn Progress) {
     }
 }
 
-/// What `of_case` gives for each case, in their order. By several processes one after another, since all have to come to the same case together; else side by side.
+/// Returns the results of `of_case` for each case, in their order. By several processes one after another, since all have to come to the same case together; else side by side.
 fn each<C: Sync, R: Send>(
     ranks: Option<&dyn Ranks>,
     cases: &[C],

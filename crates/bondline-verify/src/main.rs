@@ -21,7 +21,7 @@ static ALLOCATOR: Allocator = Allocator;
 /// Exit status of what is short, wrong or impossible.
 const WRONG: u8 = 1;
 
-/// Measure what the code claims, as tables with limits; the exit status is 1 if any row is short.
+/// Measure the claims of the code, as tables with limits; the exit status is 1 if any row is short.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {

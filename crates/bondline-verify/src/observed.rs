@@ -64,7 +64,7 @@ impl Seen {
 /// Runs a scene by its text; nothing is written.
 ///
 /// # Errors
-/// What the scene or its run says.
+/// The message of the scene or its run.
 pub(crate) fn run_scene(text: &str) -> Result<Seen, String> {
     run_scene_in(text, &[], Path::new(""))
 }
@@ -72,7 +72,7 @@ pub(crate) fn run_scene(text: &str) -> Result<Seen, String> {
 /// Runs a scene with keys that are set otherwise, `key=value`, beside the files (name, text) that it names; nothing else is written.
 ///
 /// # Errors
-/// What the scene or its run says.
+/// The message of the scene or its run.
 pub(crate) fn run_scene_with(
     text: &str,
     overrides: &[String],

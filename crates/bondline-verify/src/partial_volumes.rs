@@ -1,4 +1,4 @@
-//! Partial volumes: sums over full families, other partitions of the ball, and what the closed forms cost against sampling.
+//! Partial volumes: sums over full families, other partitions of the ball, and the cost of the closed forms against sampling.
 //!
 //! Source: [SAND2015-7998] section 5.2.1 and the algorithm of figure 5.7.
 
@@ -22,7 +22,7 @@ use bondline::{
 pub const EXACT_PLANE: f64 = 1e-14;
 /// Exact volumes.
 pub const EXACT_SOLID: f64 = 1e-10;
-/// How much longer subdivision and sampling takes, at an error no smaller.
+/// Factor by which subdivision and sampling take longer, at least, at an error no smaller.
 pub const SPEED: f64 = 20.0;
 /// The suite `partial-volumes`.
 pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {

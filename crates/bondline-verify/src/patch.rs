@@ -272,7 +272,7 @@ pub fn relative_out_of_balance<const D: usize>(enclosed: &Enclosed<D>, degree: u
     out_of_balance(enclosed, degree) / (stress * (2.0 * l).powi(D as i32 - 1))
 }
 
-/// What round-off may make of [`relative_out_of_balance`]: half a unit in the last place of each entry of the stiffness, times its displacement, all of one sign. A column of a seam in exact equilibrium sums to zero but for that, and at a place
+/// Round-off of [`relative_out_of_balance`], at most: half a unit in the last place of each entry of the stiffness, times its displacement, all of one sign. A column of a seam in exact equilibrium sums to zero but for that, and at a place
 /// `x` its share grows as `(x/h)²` against the force on a face, which does not know of the spacing.
 pub fn round_off<const D: usize>(enclosed: &Enclosed<D>, degree: u32) -> f64 {
     let k = &enclosed.stiffness;

@@ -29,7 +29,7 @@ const YOUNG: f64 = 1000.0;
 const POISSON: f64 = 0.3;
 const STRAIN: f64 = 1e-3;
 
-/// What a run shows: the last fields, and the rows of probes.
+/// Results of a run: the last fields, and the rows of probes.
 #[derive(Debug, Default)]
 struct Seen {
     snapshot: Mutex<Option<Snapshot>>,
@@ -283,7 +283,7 @@ fn relaxations(progress: &dyn Progress) -> Table {
 /// Draws figure 4.7, the energy of the sheared cube by the time, as `pave_relaxation.svg`.
 ///
 /// # Errors
-/// What a run says, or the file.
+/// The message of a failed run, or of the file.
 pub fn figures(folder: &Path, progress: &dyn Progress) -> Result<Vec<PathBuf>, String> {
     progress.stage("relaxation", Some(4));
     let mut series = Vec::new();

@@ -1,4 +1,4 @@
-//! Waves that cross a seam: what comes back.
+//! Waves that cross a seam, and their reflection.
 //!
 //! A pulse `exp(−(x/w)²)` runs towards the seam, from the finite elements or from the points. Once it has passed, what is left on the side it came from is the reflected
 //! displacement. A lattice alone leaves something behind too: the starting velocity `−c u′` is that of the continuum, and short waves lag. So the same
@@ -29,7 +29,7 @@ pub const SPLICE: f64 = 2e-3;
 /// Reflected amplitude of the best blending at a width of 4 δ.
 pub const BLENDING: f64 = 1.5e-3;
 
-/// Where the pulse comes from.
+/// Side from which the pulse comes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// From the finite elements into the points.
@@ -54,7 +54,7 @@ impl Side {
     }
 }
 
-/// What came back, relative to the incident pulse.
+/// Reflection of a pulse, relative to the incident one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reflected {
     /// Largest displacement that the seam sent back.
@@ -78,7 +78,7 @@ pub struct Crossing {
     pub transition: u32,
     /// Width w of the pulse in horizons.
     pub width: u32,
-    /// Where it comes from.
+    /// Side from which it comes.
     pub side: Side,
 }
 
@@ -144,7 +144,7 @@ impl Crossing {
     /// Measures what the seam reflects.
     ///
     /// # Errors
-    /// Why a bar cannot be built or moved.
+    /// The reason why a bar cannot be built or moved.
     pub fn measure(&self) -> Result<Reflected, String> {
         let build = |kind| Strip::new::<1>(&self.case(kind));
         let (mut coupled, mut pure) =

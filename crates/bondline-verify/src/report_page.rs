@@ -1,4 +1,4 @@
-//! The page on what `verify` found, for `verify --markdown FILE`.
+//! The page on the results of `verify`, for `verify --markdown FILE`.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,7 @@ use bondline::observe::report::{Table, TableRow, Verdict, number};
 /// Tables that would take more lines than this are counted, not printed; a line may hold many rows.
 const MOST_LINES: usize = 80;
 
-/// What a suite gave.
+/// Results of a suite.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The suite.

@@ -21,7 +21,7 @@ pub const RESIDUAL_LIMIT: f64 = 1e-8;
 /// Most memory of a whole run \[GB\].
 pub const MEMORY_LIMIT: f64 = 5.0;
 
-/// How many times faster than the direct solver an iterative solution must be.
+/// Factor by which an iterative solution must be faster than the direct solver.
 pub const SPEED_LIMIT: f64 = 5.0;
 
 /// A square or a block of finite elements and peridynamics, held on the left, pulled and sheared on the right.

@@ -1,4 +1,4 @@
-//! The spectrum of coupled models: is their motion bounded, and by how much is the stable step below the limit?
+//! The spectrum of coupled models: the boundedness of their motion, and the margin of the stable step below the limit.
 //!
 //! Source of the question: shared design notes on partial stress with [SAND2015-7998] sections 7.2 and 7.3, which integrate no motion. All eigenvalues of `M⁻¹ K` of a
 //! strip are computed; one that is not real and positive grows as `exp(σ t)` whatever the time step ([`bondline::solve::stable_step`]).
@@ -23,7 +23,7 @@ pub const ROUND_OFF: f64 = 1e-4;
 /// A run of this many crossings is what a configuration is admitted or refused for.
 pub const CROSSINGS: f64 = 100.0;
 
-/// How the horizon runs through the transition zone.
+/// Horizon in the transition zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Horizon {
     Constant,

@@ -10,7 +10,7 @@ use crate::typed;
 use bondline::run::LinearModel;
 use bondline::system::LinearMotion;
 
-/// What holds along the strip.
+/// Model along the strip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     /// Finite elements everywhere.
@@ -44,7 +44,7 @@ impl Kind {
 /// A strip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StripCase {
-    /// What holds along it.
+    /// Model along it.
     pub kind: Kind,
     /// The law of the points; λ = μ.
     pub law: Law,
@@ -70,7 +70,7 @@ pub struct Strip {
     pub y: Vec<f64>,
     /// Blending function of each site: 1 where it is peridynamic, 0 where it is local.
     pub beta: Vec<f64>,
-    /// Where zones meet: local to transition, transition to nonlocal, and so on.
+    /// Borders of the zones: local to transition, transition to nonlocal, and so on.
     pub borders: [f64; 4],
 }
 

@@ -1,4 +1,4 @@
-//! Tangents against finite differences of energies that are written out independently, and what else every stiffness must satisfy.
+//! Tangents against finite differences of energies that are written out independently, and the other conditions that every stiffness must satisfy.
 
 use rayon::prelude::*;
 
@@ -367,7 +367,7 @@ fn small<const D: usize>(method: Method, law: Law, cells: Cells) -> Case {
     }
 }
 
-/// Whether a coupled stiffness has the same bits with one thread and with three.
+/// Returns true if a coupled stiffness has the same bits with one thread and with three.
 fn thread_invariance<const D: usize>(case: &Case) -> Result<bool, String> {
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new()

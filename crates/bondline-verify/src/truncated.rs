@@ -1,4 +1,4 @@
-//! Truncated bonds, measured: symmetry, definiteness, affine fields, equilibrium, order in the horizon, and what a symmetric matrix saves.
+//! Truncated bonds, measured: symmetry, definiteness, affine fields, equilibrium, order in the horizon, and the savings by a symmetric matrix.
 
 mod compared;
 mod zones;
@@ -40,7 +40,7 @@ pub const EQUILIBRIUM_LIMIT: f64 = 1e-12;
 /// Least order in δ at fixed m on the last halving.
 pub const ORDER: f64 = 2.0;
 
-/// How far the order may be from [`ORDER`].
+/// Tolerance of the order about [`ORDER`].
 pub const ORDER_TOLERANCE: f64 = 0.15;
 
 /// Poisson ratios of the LPS: at the value at which its state vanishes (1/4 in plane strain and solids), above, and below.
@@ -97,7 +97,7 @@ impl Material {
         )
     }
 
-    /// Whether the matrix has to be positive definite.
+    /// Returns true if the matrix has to be positive definite.
     fn is_definite(self) -> bool {
         !matches!(self, Self::Lps(nu) if nu < 0.25)
     }

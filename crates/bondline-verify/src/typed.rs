@@ -1,4 +1,4 @@
-//! What the suites type of their scenes: numbers, places, boxes, generated meshes, laws and couplings as TOML.
+//! Parts of the scenes of the suites: numbers, places, boxes, generated meshes, laws and couplings as TOML.
 //!
 //! One place for each, so that a suite differs from a scene of a person only in who types it.
 
@@ -77,12 +77,12 @@ impl Method {
         }
     }
 
-    /// Whether a transition zone has a meaning of its own.
+    /// Returns true if a transition zone has a meaning of its own.
     pub fn has_transition(self) -> bool {
         !matches!(self, Self::Splice | Self::Truncated | Self::Balanced)
     }
 
-    /// Whether the method takes a law.
+    /// Returns true if the method takes a law.
     pub fn is_offered(self, law: Law) -> bool {
         self != Self::Truncated || !matches!(law, Law::Correspondence(_))
     }
@@ -195,7 +195,7 @@ pub fn kinematics<const D: usize>() -> &'static str {
     ["bar", "plane-strain", "solid"][D - 1]
 }
 
-/// What lets a scene leave its body free: it moves. Its model at rest is the same.
+/// Table that lets a scene leave its body free: it moves. Its model at rest is the same.
 pub const FREE: &str = "[solve.explicit]\nduration = 1\n";
 
 /// No bond of a convex body leaves it: the scene need not look for those that do.

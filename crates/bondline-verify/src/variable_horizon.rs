@@ -93,7 +93,7 @@ const OMEGA: Influence = Influence::Polynomial {
     alpha: Alpha::One,
 };
 
-/// How the internal force is found.
+/// Model of the internal force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BarModel {
     /// The force states of both ends of each bond, eq. (2.5).
@@ -371,7 +371,7 @@ fn push_weighted_volume(table: &mut Table) {
     }
 }
 
-/// What section 7.2 prints of its bar: numbers of bonds, and stable steps.
+/// Numbers that section 7.2 prints of its bar: bonds, and stable steps.
 fn printed(varying: &Option<usize>) -> Table {
     let mut table = Table::new(
         "[SAND2015-7998] section 7.2: bonds, stable steps, and the influence function of Algorithm 1",
@@ -518,7 +518,7 @@ pub fn figures(folder: &Path, progress: &dyn Progress) -> Result<(), FigureError
     Ok(())
 }
 
-/// Why a figure could not be made.
+/// Failure to draw a figure.
 #[derive(Debug, thiserror::Error)]
 pub enum FigureError {
     /// The bar.

@@ -1,6 +1,6 @@
-//! Waves for 100 000 steps: what a motion conserves.
+//! Waves for 100 000 steps: the quantities that a motion conserves.
 //!
-//! Where the stiffness is symmetric, velocity Verlet conserves `½ v_{n+½}ᵀ M v_{n+½} + ½ u_nᵀ K u_{n+1}` to round-off, and a free body its momentum. Splice, blending and
+//! For a symmetric stiffness, velocity Verlet conserves `½ v_{n+½}ᵀ M v_{n+½} + ½ u_nᵀ K u_{n+1}` to round-off, and a free body its momentum. Splice, blending and
 //! partial stress have no energy of their own: theirs is the sum of the bodies' own energies, kinetic and stored, which a seam must leave as it was once a pulse has
 //! passed. It is read as `½ vᵀ M v + ½ uᵀ K u` while the pulse is clear of the seams, where the rows in motion are those of one body.
 
@@ -165,7 +165,7 @@ fn symmetric_rows(name: &str, strip: Result<Strip, String>) -> Vec<TableRow> {
     measured().unwrap_or_else(|reason| vec![TableRow::refused(name, "discrete energy", reason)])
 }
 
-/// What a pulse's energy did while it was clear of the seams.
+/// Change of a pulse's energy while it was clear of the seams.
 #[derive(Clone, Copy, Debug)]
 pub struct OwnEnergy {
     /// Largest change, relative.
@@ -179,7 +179,7 @@ pub struct OwnEnergy {
 /// The bodies' own energy of a strip through which a pulse runs.
 ///
 /// # Errors
-/// Why the motion cannot start or go on.
+/// The reason why the motion cannot start or go on.
 pub fn own_energy(strip: &mut Strip, reach: f64) -> Result<OwnEnergy, String> {
     let limit = stable_step::stable_step(&strip.motion, &[]).map_err(|e| e.to_string())?;
     let start = pulse(strip);

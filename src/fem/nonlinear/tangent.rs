@@ -1,4 +1,4 @@
-//! The consistent tangent of elements whose law is not linear, as what it has beyond the tangent at rest of the linear elements.
+//! The consistent tangent of elements whose law is not linear, as its excess over the tangent at rest of the linear elements.
 //!
 //! With `C` the algorithmic tangent `∂P/∂G` of the law and `C₀` that at rest,
 //!
@@ -31,7 +31,7 @@ use crate::{
 const CHUNK: usize = 512;
 
 impl<const D: usize> NonlinearElements<D> {
-    /// Whether the tangent of each element is symmetric.
+    /// Returns true if the tangent of each element is symmetric.
     pub fn has_symmetric_tangent(&self) -> bool {
         self.laws.iter().all(|law| law.has_symmetric_tangent())
     }
@@ -58,7 +58,7 @@ impl<const D: usize> NonlinearElements<D> {
     }
 }
 
-/// What the tangent of an element has beyond that of the linear one.
+/// Tangent of an element less that of the linear one.
 fn tangent<const D: usize>(
     mesh: &Mesh<D>,
     element: &Element,
@@ -96,7 +96,7 @@ fn tangent<const D: usize>(
     blocks
 }
 
-/// Adds what the mean dilatation of a cell makes of the tangent at a point.
+/// Adds the part of the mean dilatation of a cell in the tangent at a point.
 fn add_dilatation<const D: usize>(
     p: &QuadraturePoint<D>,
     tangent: &Tensor4<D>,

@@ -1,4 +1,4 @@
-//! What a part, an instance or the model itself holds: nodes, elements, sets and surfaces by their numbers.
+//! Content of a part, an instance or the model itself: nodes, elements, sets and surfaces by their numbers.
 
 use rustc_hash::FxHashMap;
 
@@ -21,7 +21,7 @@ pub(super) struct Node {
 pub(super) struct Element {
     pub number: u64,
     pub kind: Kind,
-    /// Where its nodes start in [`Body::element_nodes`].
+    /// Start of its nodes in [`Body::element_nodes`].
     pub start: usize,
     /// Byte where it stands.
     pub at: usize,
@@ -30,12 +30,12 @@ pub(super) struct Element {
 /// Numbers `first, first + step, …, last` of nodes or elements.
 #[derive(Clone, Copy)]
 pub(super) struct Members {
-    /// Whose they are: a number in the list of bodies, or [`THIS`].
+    /// Their owner: a number in the list of bodies, or [`THIS`].
     pub body: u32,
     pub first: u64,
     pub last: u64,
     pub step: u64,
-    /// Whether a range was asked for, which may have gaps.
+    /// True if a range was asked for, which may have gaps.
     pub range: bool,
     /// Byte where they stand.
     pub at: usize,
@@ -80,7 +80,7 @@ impl<T> Default for Sets<T> {
     }
 }
 
-/// By what a name is looked up: quotes keep capitals, and are no part of it.
+/// Returns the key by which a name is looked up: quotes keep capitals, and are no part of it.
 pub(super) fn key(name: &str) -> String {
     match unquoted(name) {
         Some(inner) => inner.into(),
@@ -130,7 +130,7 @@ pub(super) struct Body {
     pub node_sets: Sets<Members>,
     pub element_sets: Sets<Members>,
     pub surfaces: Sets<Sides>,
-    /// How an instance lies, where it does not lie as its part.
+    /// Position of an instance, where it differs from that of its part.
     pub motion: Option<Motion>,
 }
 
@@ -166,7 +166,7 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// Where a point comes to lie; one that does not move keeps its bits.
+    /// Returns the position of a point after the motion; one that does not move keeps its bits.
     pub fn apply(&self, x: [f64; 3]) -> [f64; 3] {
         let x: [f64; 3] = std::array::from_fn(|k| x[k] + self.translation[k]);
         let Some((a, b, degrees)) = self.rotation else {

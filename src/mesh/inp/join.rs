@@ -1,4 +1,4 @@
-//! From bodies to a mesh: numbers of all instances, members of sets, faces of surfaces, and what is left out.
+//! From bodies to a mesh: numbers of all instances, members of sets, faces of surfaces, and notes on the parts left out.
 
 use std::collections::HashMap;
 
@@ -10,7 +10,7 @@ use super::text::REWRITE;
 use crate::mesh::raw::{RawElement, RawMesh, RawNode};
 use crate::mesh::{CellShape, MeshError};
 
-/// So many lines of a keyword that is left out are told.
+/// Largest number of lines that a note lists for a keyword that is left out.
 const MOST_LINES: usize = 4;
 /// Keywords that give lines and surfaces a stiffness of their own.
 const SECTIONS: [&str; 4] = [
@@ -40,7 +40,7 @@ pub(super) fn join(reader: &Reader) -> Result<RawMesh, MeshError> {
     Ok(join.raw)
 }
 
-/// What is added to the numbers of each body, so that no two share one: nothing to the first that has nodes.
+/// Offsets of the numbers of each body, so that no two share one: zero for the first that has nodes.
 fn offsets(bodies: &[Body]) -> Vec<u64> {
     let numbers = |body: &Body| {
         let nodes = body.nodes.iter().map(|n| n.number);
@@ -57,7 +57,7 @@ fn offsets(bodies: &[Body]) -> Vec<u64> {
     bodies.iter().map(&mut offset).collect()
 }
 
-/// Which of the three nodes of a line of second order lies between the others: the second by the manuals of Abaqus and CalculiX, as Gmsh writes it; meshio writes the third.
+/// Index of the node of a line of second order that lies between the other two: the second by the manuals of Abaqus and CalculiX, as Gmsh writes it; meshio writes the third.
 fn middle(body: &Body, nodes: &[u64]) -> usize {
     let places: Vec<[f64; 3]> = (nodes.iter())
         .map(|n| body.nodes[body.node_places[n] as usize].x)
@@ -206,7 +206,7 @@ impl Join<'_, '_> {
         Ok(lists)
     }
 
-    /// The members of a set that there are. A range may have gaps, which are told; a single number may not be missing.
+    /// The members of a set that there are. A range may have gaps, which are noted; a single number may not be missing.
     fn found(
         &mut self,
         members: &Members,
@@ -314,7 +314,7 @@ impl Join<'_, '_> {
         });
     }
 
-    /// What of the deck is left out.
+    /// Adds notes on the parts of the deck that are left out.
     fn tell(&mut self) {
         let source = &self.reader.source;
         let path = source.path.display();

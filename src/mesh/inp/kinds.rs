@@ -8,7 +8,7 @@ use crate::mesh::CellShape;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Kind {
     pub shape: CellShape,
-    /// Whether its faces are counted as those of a shell: both sides first, then edges.
+    /// True if its faces are counted as those of a shell: both sides first, then edges.
     pub shell: bool,
 }
 

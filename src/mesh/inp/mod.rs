@@ -1,7 +1,7 @@
 //! Decks of Abaqus and CalculiX (`.inp`): nodes, elements, sets, surfaces, parts and their instances.
 //!
 //! Sources: Abaqus Keywords Reference Guide; CalculiX CrunchiX user's manual, "Input deck format". Materials, conditions and
-//! steps are left out, and told of; keywords that would make or move nodes and are not read are refused.
+//! steps are left out with a note; keywords that would make or move nodes and are not read are refused.
 //!
 //! Element sets become sets of cells and facets by the dimension of their elements, surfaces of elements facet sets, node sets
 //! and surfaces of nodes node sets. A set of an instance is called `instance.set`. Keywords and names do not mind capitals; a
@@ -11,7 +11,7 @@
 //! |---|---|
 //! | `text.rs` | included files, keyword lines |
 //! | `kinds.rs` | types of elements, their faces |
-//! | `body.rs` | what a part or an instance holds |
+//! | `body.rs` | content of a part or an instance |
 //! | `sets.rs` | the keywords of sets and surfaces |
 //! | `join.rs` | from bodies to a mesh |
 
@@ -81,7 +81,7 @@ pub(super) fn parse<'a>(
     Ok((raw, reader.source))
 }
 
-/// To what nodes, elements and sets belong.
+/// Owner of nodes, elements and sets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Scope {
     Model,
@@ -98,7 +98,7 @@ struct Reader<'a> {
     bodies: Vec<Body>,
     /// Keywords that are left out, with the bytes where they stand.
     ignored: BTreeMap<String, Vec<usize>>,
-    /// Where the first axisymmetric elements stand.
+    /// Position of the first axisymmetric elements.
     axisymmetric: Option<usize>,
 }
 
@@ -383,7 +383,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// The next data line of the keyword; comments and empty lines are passed over.
+    /// The next data line of the keyword; comments and empty lines are skipped.
     fn data(&mut self) -> Result<Option<(usize, &'a str)>, MeshError> {
         loop {
             let at = self.at;
@@ -402,7 +402,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Passes over what is left of the keyword's lines, whatever it holds.
+    /// Skips the rest of the keyword's lines, whatever they hold.
     fn skip_data(&mut self) {
         let bytes = self.source.bytes;
         while self.at < bytes.len() {

@@ -6,7 +6,7 @@ use super::text::Card;
 use super::{Reader, fields, one};
 use crate::mesh::MeshError;
 
-/// Of what a set is.
+/// Kind of a set's members.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Of {
     Nodes,
@@ -55,7 +55,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// To which body numbers belong: to the one that is being read, or to that of the parameter INSTANCE.
+    /// Returns the body to which numbers belong: the one that is being read, or that of the parameter INSTANCE.
     fn body_named(&self, card: &Card) -> Result<u32, MeshError> {
         let Some(name) = card.get("INSTANCE") else {
             return Ok(self.own());
@@ -88,7 +88,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// What a word in a set stands for: a number, a set, or either of an instance.
+    /// Returns the members that a word in a set stands for: a number, a set, or either of an instance.
     fn named(
         &mut self,
         at: usize,

@@ -6,7 +6,7 @@ use crate::mesh::MeshError;
 use crate::mesh::raw::{Encoding, Piece, Source};
 use crate::regular_file;
 
-/// What a wrong line calls for.
+/// Remedy for a wrong line.
 pub(super) const REWRITE: &str = "correct the deck, or write it again";
 /// The most files that a deck may include, one counted as often as it is named.
 const MOST_INCLUDED: usize = 1000;
@@ -132,7 +132,7 @@ pub(in crate::mesh) fn load(path: &Path) -> Result<(Vec<u8>, Vec<Piece>), MeshEr
     Ok((whole.bytes, whole.pieces))
 }
 
-/// What has been put together so far.
+/// Text that has been put together so far.
 struct Whole {
     /// Names of files are relative to the folder of the deck.
     folder: PathBuf,
@@ -221,7 +221,7 @@ impl Whole {
     }
 }
 
-/// Whether a keyword line may name a file; spares reading the others.
+/// Returns true if a keyword line may name a file; spares reading the others.
 fn may_include(line: &[u8]) -> bool {
     !line.starts_with(b"**")
         && (line.ends_with(b",") || line.windows(5).any(|w| w.eq_ignore_ascii_case(b"INPUT")))

@@ -3,10 +3,10 @@
 //! | file | field |
 //! |---|---|
 //! | `displacement.rs`, `velocity.rs` | motion of nodes and points |
-//! | `beta.rs`, `horizon.rs`, `size.rs` | what the coupling makes of a place |
+//! | `beta.rs`, `horizon.rs`, `size.rs` | blending function, horizon and spacing of points |
 //! | `residual.rs` | force out of balance, on supports the reaction |
 //! | `damage.rs` | share of the bonds that are broken |
-//! | `model.rs`, `material.rs`, `volume.rs` | what a cell is |
+//! | `model.rs`, `material.rs`, `volume.rs` | model, material and volume of a cell |
 //! | `strain.rs`, `stress.rs`, `stress_numbers.rs` | strain, stress and the numbers made of it |
 //! | `energy_density.rs`, `strain_energy_density.rs` | stored energy of points; of elements and points |
 //! | `stored_energy.rs` | the energies of both |
@@ -117,7 +117,7 @@ pub enum Rank {
     Tensor,
 }
 
-/// When files have a field.
+/// Condition under which files have a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WrittenWhen {
     /// Always, where a solution has it.
@@ -150,7 +150,7 @@ pub struct About {
     pub on: On,
     /// Numbers at a place.
     pub rank: Rank,
-    /// When it is written.
+    /// Condition under which it is written.
     pub wanted: WrittenWhen,
     /// In tables.
     pub columns: TableColumns,

@@ -10,7 +10,7 @@ pub(crate) struct CellBoxes<const D: usize> {
     /// Size of a bin, the extent of the largest cell.
     size: f64,
     counts: [usize; D],
-    /// Where the cells of each bin begin, and their numbers.
+    /// Offsets of the bins in the list of cells, and that list.
     offsets: Vec<u32>,
     cells: Vec<u32>,
 }

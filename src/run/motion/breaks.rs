@@ -1,14 +1,14 @@
-//! Whether bonds may break in a run.
+//! Possibility that bonds break in a run.
 
 use crate::run::setup::RunSettings;
 use crate::system::SemiDiscrete;
 
-/// Whether bonds may break.
+/// Possibility that bonds break.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Breaks {
-    /// They may, at a stretch.
+    /// They may, at a critical stretch or tearing parameter.
     Possibly,
-    /// They may, by a damage that grows before.
+    /// They may, by a damage that grows gradually before.
     Gradually,
     /// None does.
     Never,
@@ -17,13 +17,13 @@ pub enum Breaks {
 }
 
 impl Breaks {
-    /// Whether bonds may break.
+    /// Returns true if bonds may break.
     pub fn may(self) -> bool {
         matches!(self, Self::Possibly | Self::Gradually)
     }
 }
 
-/// Whether bonds may break.
+/// Determines whether bonds may break.
 pub fn breaks<const D: usize>(system: &dyn SemiDiscrete, rest: &RunSettings<D>) -> Breaks {
     let state = system.body_state();
     match state.and_then(|state| state.damage()) {

@@ -1,4 +1,4 @@
-//! How far cracks grow from one row of the history to the next, in load steps within one of them.
+//! Growth of cracks from one row of the history to the next, which for load steps is growth within one of them.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ use crate::solve::explicit::State;
 pub struct CrackGrowth {
     /// Area of the cracks at the last row.
     area: f64,
-    /// What one step added, at most.
+    /// Largest growth in one step.
     largest: f64,
     /// That step.
     step: u64,
@@ -24,10 +24,10 @@ pub struct CrackGrowth {
 /// 0.29 in the largest of its steps, plates with edge cracks that snap 0.95 to 1.
 const SHARE: f64 = 0.5;
 
-/// Of what breaking dissipates, the part set free from which on a crack counts as having run by itself in several steps.
+/// Energy set free by breaking, over the energy that breaking dissipates, from which on a crack counts as having run by itself in several steps.
 const SET_FREE: f64 = 0.5;
 
-/// Horizons of growth below which nothing is told: bonds break in steps of a spacing.
+/// Horizons of growth below which nothing is warned of: bonds break in steps of a spacing.
 const HORIZONS: f64 = 5.0;
 
 impl CrackGrowth {
@@ -40,9 +40,9 @@ impl CrackGrowth {
         self.area = area;
     }
 
-    /// What load steps warn of, where one of them took most of the crack, or breaking set much energy free; energies \[J\] (per metre of thickness in 2D).
+    /// Returns the warning of load steps of which one took most of the crack, or in which breaking set much energy free; energies \[J\] (per metre of thickness in 2D).
     ///
-    /// Where one step took most, energies do not tell: bonds beside the path take what would be set free. A bar breaks at once.
+    /// If one step took most, energies are no criterion: bonds beside the path take the energy that would be set free. A bar breaks at once.
     pub fn warning<const D: usize>(
         &self,
         horizon: f64,

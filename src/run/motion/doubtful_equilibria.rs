@@ -1,4 +1,4 @@
-//! What makes the equilibria of load steps doubtful: forces out of balance, stresses that families do not resolve.
+//! Doubts about the equilibria of load steps: forces out of balance, stresses that families do not resolve.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::scene::spec::CouplingTraits;
 use crate::solve::quasi_static::LoadStep;
 use crate::tensor::Vector;
 
-/// Watches load steps for what their equilibria do not show.
+/// Watches load steps for errors that their equilibria do not show.
 pub(super) struct DoubtfulEquilibria<'a, const D: usize> {
     model: &'a Model<D>,
     rest: &'a RunSettings<D>,
@@ -26,7 +26,7 @@ pub(super) struct DoubtfulEquilibria<'a, const D: usize> {
     scale: f64,
     /// The largest displacement \[m\].
     furthest: f64,
-    /// Whether a load step has been asked for its peak of stress.
+    /// True once a load step has been examined for its peak of stress.
     asked: bool,
     steep: Vec<String>,
 }
@@ -66,7 +66,7 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
         self.ask_for_peak(seen);
     }
 
-    /// Asks the first load step that deforms the body, as long as it is whole, for a peak of stress: beyond it, flow and cracks change what the elastic response tells.
+    /// Examines the first load step that deforms the body, as long as it is whole, for a peak of stress: beyond it, flow and cracks change the elastic response.
     fn ask_for_peak(&mut self, seen: &LoadStep<'_>) {
         let stresses = &self.rest.stresses;
         let u = &seen.state.u;

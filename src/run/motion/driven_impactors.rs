@@ -1,4 +1,4 @@
-//! How impactors move that are not free, and where all of them begin.
+//! Motion of impactors that are not free, and the initial state of all impactors.
 
 use super::way::Way;
 use crate::scene::conditions::Components;

@@ -1,4 +1,4 @@
-//! The moving system of a scene: what moves, with what mass, from where.
+//! The dynamic system of a scene: its forces, its masses and its initial state.
 
 #![deny(clippy::wildcard_enum_match_arm)]
 
@@ -31,30 +31,30 @@ use crate::solve::explicit::State;
 use crate::system::{LinearMotion, Ranks, SemiDiscrete};
 use crate::tensor::Vector;
 
-/// What moves, and what it holds.
+/// Dynamic system of a scene, with its memory and its properties.
 pub struct DynamicSystem<'a> {
     /// The system.
     pub system: Box<dyn SemiDiscrete + 'a>,
     /// Bytes of rows and bonds.
     pub bytes: usize,
-    /// Whether its force is linear in the displacement.
+    /// True if its force is linear in the displacement.
     pub is_linear: bool,
-    /// Whether bonds of the seam turn and break like others.
+    /// True if bonds of the seam rotate and break like others.
     pub has_exact_seam: bool,
 }
 
-/// What a layout of the zones begins with, beside the scene.
+/// Input to a layout of the zones, beside the scene.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct LayoutStart<'a, const D: usize> {
     /// Bonds that are broken from the start.
     pub broken: Option<&'a BrokenBonds<D>>,
     /// The processes that compute together, if there are several.
     pub ranks: Option<&'a dyn Ranks>,
-    /// What each of them has to itself.
+    /// Parts of the run that each of them has to itself.
     pub sharing: Sharing,
 }
 
-/// What moves: bonds where they can be passed over, the assembled stiffness where they cannot and nothing breaks.
+/// Returns the dynamic system: bonds where they can be traversed, the assembled stiffness where they cannot and forces are linear in the displacement.
 ///
 /// # Errors
 /// [`RunError::System`] for bonds that cannot stretch or break, [`RunError::Fracture`].
@@ -138,7 +138,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
     }
 }
 
-/// Whether forces are linear in the displacement: nothing breaks, touches or bends.
+/// Returns true if forces are linear in the displacement: no failure, no contact, and bonds, laws and elements that are linear.
 fn is_linear<const D: usize>(
     model: &Model<D>,
     rest: &RunSettings<D>,
@@ -163,7 +163,7 @@ fn sharing_steps<const D: usize>(
     }
 }
 
-/// How the weights of bonds are kept.
+/// Returns the storage of the weights of bonds.
 fn storage(precision: PrecisionSpec) -> Storage {
     match precision {
         PrecisionSpec::Double => Storage::Double,
@@ -171,7 +171,7 @@ fn storage(precision: PrecisionSpec) -> Storage {
     }
 }
 
-/// In words: at which stretch bonds break, and what fracture energy that is; or what a law was calibrated to.
+/// Returns in words the stretch at which bonds break, and the fracture energy of that; or the calibration of a law.
 fn failure_text<const D: usize>(
     model: &Model<D>,
     critical: Option<&FailureCriterion>,
@@ -222,7 +222,7 @@ fn failure_text<const D: usize>(
     }
 }
 
-/// Tells how bonds deform and break, and how they are stored.
+/// Reports how bonds deform and break, and how they are stored.
 fn tell_bonds<const D: usize>(
     model: &Model<D>,
     coupling: &dyn Coupling<D>,
@@ -342,14 +342,14 @@ pub(crate) fn still<'a, const D: usize>(
     ))
 }
 
-/// Why bonds are not passed over, without the remedy: nothing is wrong.
+/// Returns the reason for not traversing bonds, without the remedy of the error: nothing is wrong.
 fn reason(error: &SystemError) -> String {
     let text = error.to_string();
     let end = text.find(';').unwrap_or(text.len());
     text[..end].to_owned()
 }
 
-/// What breaks bonds, if anything does.
+/// Returns the failure criterion of bonds, if there is one.
 pub(crate) fn failure_criterion<const D: usize>(
     model: &Model<D>,
     rest: &RunSettings<D>,
@@ -405,7 +405,7 @@ pub(crate) fn failing_stretch<const D: usize>(
     )
 }
 
-/// What a plane of the lattice costs to open at the stretch at which bonds break, per area, and the energy that was typed; none where nothing breaks, or where lattices differ.
+/// Returns the energy per area of opening a plane of the lattice at the critical stretch, and the fracture energy of the scene; none where nothing breaks, or where lattices differ.
 pub(crate) fn plane_energy<const D: usize>(
     model: &Model<D>,
     rest: &RunSettings<D>,
@@ -435,12 +435,12 @@ pub(crate) fn plane_energy<const D: usize>(
     }))
 }
 
-/// What opening a plane costs \[J/m²\].
+/// Energy of opening a plane \[J/m²\].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PlaneEnergy {
     /// By the bonds of the lattice.
     pub of_plane: f64,
-    /// As the scene has it.
+    /// By the fracture energy of the scene.
     pub typed: Option<f64>,
 }
 

@@ -48,15 +48,15 @@ pub fn sizes<const D: usize>(model: &Model<D>, operator: &dyn Operator<D>) -> Si
     }
 }
 
-/// Where a run with one layout of zones begins.
+/// Start of a segment of a run, which has one layout of the zones.
 enum From<'a, const D: usize> {
     /// At time zero, or at a checkpoint.
     Start(CheckpointFile, Option<Box<Saved>>),
-    /// Where the zones have changed.
+    /// At a change of the zones.
     Switch(Box<RezoneState<'a, D>>),
 }
 
-/// How it ends.
+/// End of a segment of a run.
 enum RunSegment<'a, const D: usize> {
     /// With the run.
     Ended(Box<RunSummary>),
@@ -137,7 +137,7 @@ fn zones_of(nonlocal: &[bool]) -> Vec<Zone> {
     nonlocal.iter().map(zone).collect()
 }
 
-/// What the run tells of itself at the end of a segment, whatever follows.
+/// Record of a run at the end of a segment, whatever follows.
 struct SegmentRecord {
     title: String,
     traits: CouplingTraits,
@@ -145,7 +145,7 @@ struct SegmentRecord {
     choices: Vec<Decision>,
     proof: Proof,
     timings: Timings,
-    /// What is known of modes that grow.
+    /// Part of the proof about growing modes.
     growth: Option<Part>,
     /// Steps taken by this program, and their seconds.
     taken: (u64, f64),
@@ -165,7 +165,7 @@ fn run_segment<'r, const D: usize>(
         .map_err(|error| explained(error, model, &model.local_laws(&rest.local_laws)))
 }
 
-/// Whether the balance of energy is watched: what is proved of the undeformed body need not hold of one whose law changes with its strain.
+/// Decides whether the balance of energy is watched: a proof for the undeformed body need not hold for one whose law changes with its strain.
 fn balance_of<const D: usize>(
     model: &Model<D>,
     rest: &RunSettings<D>,
@@ -271,7 +271,7 @@ fn take_segment<'r, const D: usize>(
 }
 
 impl SegmentRecord {
-    /// What the next segment needs, where the zones change to `nonlocal` cells.
+    /// Returns the state that the next segment needs, where the zones change to `nonlocal` cells.
     fn rezone<'r, const D: usize>(
         self,
         observer: StepObserver<'_, 'r, D>,
@@ -426,7 +426,7 @@ fn motion_summary<const D: usize>(
     })
 }
 
-/// What breaking bonds cost so far; none where none can break.
+/// Returns the dissipation by breaking bonds so far; none where none can break.
 pub(crate) fn cracks(
     system: &dyn SemiDiscrete,
     breaks: Breaks,
@@ -447,7 +447,7 @@ pub(crate) fn cracks(
     })
 }
 
-/// What a law with memory dissipated; none of any other.
+/// Returns the energy that a law with history variables has dissipated; none if that is zero.
 pub fn inelastic_energy(system: &dyn SemiDiscrete) -> Option<f64> {
     let inelastic = system.dissipation().map(|d| d.inelastic);
     inelastic.filter(|energy| *energy != 0.0)

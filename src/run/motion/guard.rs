@@ -1,6 +1,6 @@
-//! What is watched while a run goes on: energy that nobody put in, elements that rotate, and what is linear beyond where its material is.
+//! Monitoring of a run: energy that nothing supplied, elements that rotate, and linear parts beyond the range in which their material is linear.
 //!
-//! A model whose stiffness is symmetric and positive, whatever its strain, keeps its energy, and is not asked. Every other may feed its modes at the seam, whatever was computed before the first step:
+//! A model whose stiffness is symmetric and positive, whatever its strain, keeps its energy, and is not watched. Every other may feed its modes at the seam, whatever was computed before the first step:
 //!
 //! ```text
 //! gain = (kinetic + stored + dissipated − work − start) / (largest of |kinetic + stored| and |work| so far)
@@ -23,10 +23,10 @@ const STEPS: u64 = 100;
 /// Looks at a whole run, at most, beside those at rows of the history.
 const LOOKS: u64 = 1000;
 
-/// A gain of this part is told.
+/// Relative gain of energy beyond which it is warned of.
 pub(crate) const TOLD: f64 = 0.01;
 
-/// Whether the balance of energy is watched.
+/// Kind of energy balance, which decides whether it is watched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Balance {
     /// It closes by construction.
@@ -40,7 +40,7 @@ pub(crate) enum Balance {
 }
 
 impl Balance {
-    /// Whether a gain of energy says anything.
+    /// Returns true if a gain of energy means anything.
     fn is_watched(self) -> bool {
         matches!(self, Self::WatchedForLaw | Self::Watched)
     }
@@ -59,7 +59,7 @@ pub(crate) fn energies_are_apart<const D: usize>(
     is_heated && knows_heat && has_elements()
 }
 
-/// The limits of a run, and what was seen of them.
+/// The limits of a run, and the values observed so far.
 pub(crate) struct Guard<'m, const D: usize> {
     balance: Balance,
     largest_gain: f64,
@@ -90,17 +90,17 @@ impl<'m, const D: usize> Guard<'m, D> {
         }
     }
 
-    /// Whether anything may be looked at after a step.
+    /// Returns true if energies, rotations or strains may be looked at after a step.
     pub fn looks_after(&self, step: u64) -> bool {
         step.is_multiple_of(self.every)
     }
 
-    /// Whether energies are wanted after a step, be there a row of the history or not.
+    /// Returns true if energies are wanted after a step, be there a row of the history or not.
     pub fn wants_energies(&self, step: u64) -> bool {
         self.balance.is_watched() && step.is_multiple_of(self.every)
     }
 
-    /// Looks at the energies of a state; returns why the run has to end.
+    /// Looks at the energies of a state; returns the reason, if any, to end the run.
     pub fn look_at_energies(&mut self, moment: &Moment<'_>, row: &EnergyRow) -> Option<Ended> {
         let energy = (row.kinetic + row.stored).abs().max(row.work.abs());
         let seen = &mut self.seen;
@@ -131,7 +131,7 @@ impl<'m, const D: usize> Guard<'m, D> {
             .or(gained.map(|_| Ended::EnergyGained))
     }
 
-    /// Looks at the rotation of elements, and at the strains of what is linear, where that is due; returns why the run has to end.
+    /// Looks at the rotation of elements, and at the strains of linear parts, where that is due; returns the reason, if any, to end the run.
     pub fn look_at_strains(&mut self, moment: &Moment<'_>, is_last: bool) -> Option<Ended> {
         let state = moment.state;
         if !(is_last || state.step.is_multiple_of(self.every)) {
@@ -152,7 +152,7 @@ impl<'m, const D: usize> Guard<'m, D> {
         (found.degrees > self.largest_rotation).then_some(Ended::ElementsRotated)
     }
 
-    /// What the summary tells of energy; none of a run whose balance closes by construction.
+    /// Returns the energy gain for the summary; none of a run whose balance closes by construction.
     pub fn energy_gain(&self) -> Option<EnergyGain> {
         let (most, step, time) = self.seen.most?;
         let (_, told_step, told_time) = self.seen.told.unwrap_or((most, step, time));
@@ -166,12 +166,12 @@ impl<'m, const D: usize> Guard<'m, D> {
         })
     }
 
-    /// What is linear or whole beyond where its material is, in a run that ends at a time.
+    /// Returns warnings of parts that are linear or whole beyond the range in which their material is, in a run that ends at a time.
     pub fn passed(&self, time: f64) -> impl Iterator<Item = String> {
         self.parts.told(&self.seen.passed, time)
     }
 
-    /// What the summary tells of rotation; none where no element has rotated enough to matter.
+    /// Returns the rotation for the summary; none where no element has rotated enough to matter.
     pub fn rotation(&self) -> Option<Rotation> {
         let r = self.seen.rotated?;
         self.rotations.told(

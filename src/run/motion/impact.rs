@@ -1,4 +1,4 @@
-//! Rigid impactors of a run: their contact beside what moves.
+//! Rigid impactors of a run: their contact with the body.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use crate::system::WithTerms;
 /// Depth inside an impactor at time zero over the size of the body, up to which a body touches it only.
 const TOUCHES: f64 = 1e-9;
 
-/// What moves together with the impactors of the scene; as it is where the scene has none. `begin` is the state at time zero; contact counts `counted` times in the bounds of the stable step.
+/// Adds the impactors of the scene to a dynamic system, which stays as it is where the scene has none. `begin` is the state at time zero; contact counts `counted` times in the bounds of the stable step.
 ///
 /// # Errors
 /// [`RunError::Overlap`] for an impactor that lies over the body at time zero.

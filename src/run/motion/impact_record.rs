@@ -1,4 +1,4 @@
-//! What a run tells of its impactors: columns of the history, and the summary.
+//! Record of the impactors of a run: columns of the history, and the summary.
 
 use std::sync::Arc;
 
@@ -35,7 +35,7 @@ const COARSE: f64 = 4.0;
 /// See [`COARSE`].
 const RESOLVED: f64 = 8.0;
 
-/// What a run tells of its impactors.
+/// Record of the impactors of a run.
 pub struct ImpactRecord<const D: usize> {
     impact: Arc<Impact<D>>,
     names: Vec<String>,
@@ -90,7 +90,7 @@ impl<const D: usize> ImpactRecord<D> {
         [at_rest + of(&state.u), of(&state.v)]
     }
 
-    /// The force of an impactor on the body: what decelerates a free one, or moves one that is prescribed.
+    /// Returns the force of an impactor on the body: that which decelerates a free one, or moves one that is prescribed.
     fn force(&self, k: usize, state: &State, forces: &[f64]) -> Vector<D> {
         let dof = (self.impact.sites() + k) * D;
         match self.impact.impactors()[k].mass {
@@ -140,7 +140,7 @@ impl<const D: usize> ImpactRecord<D> {
         })
     }
 
-    /// What the summary tells.
+    /// Returns the summary of each impactor.
     pub fn summary(&self, state: &State) -> Vec<ImpactorSummary> {
         let of = |(k, name): (usize, &String)| {
             let [place, velocity] = self.motion(k, state);

@@ -1,4 +1,4 @@
-//! What the steps with one layout of the zones begin with: at time zero, at a checkpoint, or where the zones have changed.
+//! Initial state of the steps with one layout of the zones: at time zero, at a checkpoint, or where the zones have changed.
 
 use std::sync::Arc;
 
@@ -37,12 +37,12 @@ pub(crate) struct RezoneState<'a, const D: usize> {
     pub timings: Timings,
     pub leaving: Leaving<D>,
     pub broken: BrokenBonds<D>,
-    /// What breaking them has cost.
+    /// Dissipation by breaking them.
     pub spent: Option<Dissipation>,
     /// The cells that become nonlocal.
     pub nonlocal: Vec<bool>,
     pub recorder: Recorder<'a, D>,
-    /// Whether a checkpoint was due with the change.
+    /// True if a checkpoint was due with the change.
     pub due: bool,
     pub pace: StepChoice,
     pub edge: Option<EdgeReached>,
@@ -53,7 +53,7 @@ pub(crate) struct RezoneState<'a, const D: usize> {
     pub taken: (u64, f64),
 }
 
-/// What a run with one layout needs before its first step.
+/// Data that a run with one layout needs before its first step.
 pub(crate) struct StepState<'r, 'm, const D: usize> {
     pub moving: DynamicSystem<'m>,
     pub recorder: Recorder<'r, D>,
@@ -63,27 +63,27 @@ pub(crate) struct StepState<'r, 'm, const D: usize> {
     pub edge: Option<EdgeReached>,
     pub zone: Option<SavedZone>,
     pub seen: Seen,
-    /// What is known of modes that grow; none of a run that goes on from a checkpoint.
+    /// Part of the proof about growing modes; none of a run that goes on from a checkpoint.
     pub growth: Option<Part>,
     pub told: usize,
     pub taken: (u64, f64),
     pub resumed: bool,
-    /// Whether a checkpoint is due before the first step.
+    /// True if a checkpoint is due before the first step.
     pub due: bool,
 }
 
-/// A layout before its first step, and what is told of it.
+/// A layout before its first step, and the record of it.
 pub(crate) struct PreStep<'a, 'r, 'm, const D: usize> {
     pub model: &'m Model<D>,
     pub operator: &'a dyn Operator<D>,
     pub rest: &'r RunSettings<D>,
     pub spec: &'a Spec,
     pub moving: DynamicSystem<'m>,
-    /// What springs hold the body.
+    /// Springs that hold the body.
     pub terms: Arc<ConditionTerms>,
-    /// What to do about modes that grow.
+    /// Remedy for modes that grow.
     pub remedy: &'static str,
-    /// What shows that none does, if anything does.
+    /// Evidence that none does, if there is any.
     pub proved: Option<&'static str>,
     pub choices: &'a mut Vec<Decision>,
     pub timings: &'a mut Timings,
@@ -91,7 +91,7 @@ pub(crate) struct PreStep<'a, 'r, 'm, const D: usize> {
 }
 
 impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
-    /// At time zero, or where a checkpoint was `saved`; `options` are those of the run.
+    /// Begins at time zero, or where a checkpoint was `saved`; `options` are those of the run.
     ///
     /// # Errors
     /// [`RunError`] if no stable step is found, or the checkpoint is that of another model.
@@ -176,7 +176,7 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         })
     }
 
-    /// Where the zones have changed.
+    /// Begins where the zones have changed.
     ///
     /// # Errors
     /// [`RunError`] if no stable step is found, or nothing is there that new sites could follow.

@@ -10,7 +10,7 @@ use crate::scene::material_interfaces::MaterialInterface;
 use crate::scene::materials::Fracture;
 use crate::scene::spec::CalibrationSpec;
 
-/// What breaks the bonds of a body of several materials.
+/// Critical stretches of the bonds in a body of several materials.
 struct Stretches<'a, const D: usize> {
     model: &'a Model<D>,
     law: &'a dyn Mixture<D>,
@@ -19,7 +19,7 @@ struct Stretches<'a, const D: usize> {
 }
 
 impl<const D: usize> Stretches<'_, D> {
-    /// What a plane costs to open per square of the critical stretch \[J/m²\], of points of one material.
+    /// Returns the energy of opening a plane per square of the critical stretch \[J/m²\], of points of one material.
     fn per_square(&self, material: u16) -> Result<f64, RunError> {
         let law = self.law.law(material);
         let planes = self.model.plane_energies_of(law.linearised())?;
@@ -36,7 +36,7 @@ impl<const D: usize> Stretches<'_, D> {
         })
     }
 
-    /// What a plane between two materials costs: the bonds across have half of their energy from either side, and stiffnesses by their rule.
+    /// Returns that of a plane between two materials: the bonds across have half of their energy from either side, and stiffnesses by their rule.
     fn per_square_between(&self, a: u16, b: u16) -> Result<f64, RunError> {
         let (of_a, of_b) = (self.per_square(a)?, self.per_square(b)?);
         Ok(0.5 * (of_a * self.law.relative(a, b) + of_b * self.law.relative(b, a)))

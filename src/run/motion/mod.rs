@@ -1,31 +1,31 @@
-//! Scenes in time and under a load that grows: what moves, what drives it, what is written meanwhile.
+//! Scenes in time and under a load that grows: the dynamic system, its loads, and the output during a run.
 //!
 //! | file | what |
 //! |---|---|
-//! | `setup.rs` | what every run begins with |
-//! | `breaks.rs` | whether bonds may break |
-//! | `dynamic_system.rs` | what moves, its masses, its start |
-//! | `sharing.rs` | what each of several processes has of it |
+//! | `setup.rs` | set-up of every run |
+//! | `breaks.rs` | possibility that bonds break |
+//! | `dynamic_system.rs` | the dynamic system, its masses, its initial state |
+//! | `sharing.rs` | distribution of it over several processes |
 //! | `time_dependent_loads.rs` | loads and prescribed motion as functions of time |
 //! | `explicit.rs` | the run in time |
-//! | `initial_state.rs` | what its steps begin with: at the start, at a checkpoint, after a change of the zone |
-//! | `step_observer.rs` | what follows each step: what is watched, what is written |
-//! | `quasi_static.rs`, `inside_step.rs`, `doubtful_equilibria.rs` | the run under a load that grows; progress within a step; what makes its equilibria doubtful |
-//! | `newton_factors.rs`, `spread_factors.rs` | the factors or multigrid that lead it, of one process or of several |
+//! | `initial_state.rs` | initial state of its steps: at the start, at a checkpoint, after a change of the zone |
+//! | `step_observer.rs` | observation of each step, and output |
+//! | `quasi_static.rs`, `inside_step.rs`, `doubtful_equilibria.rs` | the run under a load that grows; progress within a step; doubts about its equilibria |
+//! | `newton_factors.rs`, `spread_factors.rs` | the factors or multigrid that precondition it, of one process or of several |
 //! | `time_step.rs` | the time step, with sub-cycling |
-//! | `impact.rs`, `driven_impactors.rs`, `impact_record.rs` | rigid impactors: contact, prescribed motion, what is told of them |
-//! | `way.rs` | the way of a prescribed velocity |
-//! | `guard.rs`, `seen.rs` | what is watched meanwhile: energy, rotation of elements |
-//! | `zone_monitor.rs`, `bounding_boxes.rs` | where a zone that follows the crack is wanted |
-//! | `rezoning.rs` | what a change of the zone carries over, and what it costs |
-//! | `supports.rs` | what holds the body: forces and displacements of conditions |
-//! | `probe_rows.rs`, `section_rows.rs` | what the history tells of probes, and of sections through the body |
+//! | `impact.rs`, `driven_impactors.rs`, `impact_record.rs` | rigid impactors: contact, prescribed motion, record |
+//! | `way.rs` | the displacement by a prescribed velocity |
+//! | `guard.rs`, `seen.rs` | monitoring of energy, rotation of elements and strains |
+//! | `zone_monitor.rs`, `bounding_boxes.rs` | cells wanted in a zone that follows the crack |
+//! | `rezoning.rs` | transfer of the state over a change of the zone, and its cost in energy |
+//! | `supports.rs` | supports of the body: forces and displacements of conditions |
+//! | `probe_rows.rs`, `section_rows.rs` | columns of the history for probes, and for sections through the body |
 //! | `material_stretches.rs` | the stretch at which bonds of each material break |
-//! | `crack_growth.rs` | how far cracks grow within a load step |
+//! | `crack_growth.rs` | growth of cracks within a load step |
 //! | `tables.rs` | tables beside the history: tips of cracks, states along lines |
-//! | `tips.rs` | where the tip of a crack is |
+//! | `tips.rs` | position of a crack tip |
 //! | `writer.rs` | history, VTU files, tips of cracks, checkpoints |
-//! | `saved.rs` | what a checkpoint keeps |
+//! | `saved.rs` | content of a checkpoint |
 
 pub(crate) mod bounding_boxes;
 pub mod breaks;
@@ -75,7 +75,7 @@ use crate::scene::solve::Solve;
 use crate::scene::validated::Scene;
 use crate::system::Ranks;
 
-/// Where a run starts from.
+/// Start of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StartFrom {
     /// The beginning; files of an earlier run go.
@@ -85,12 +85,12 @@ pub enum StartFrom {
     Checkpoint,
 }
 
-/// What the caller of a run decides, beside the scene. None of it changes a result.
+/// Options of the caller of a run, beside the scene. None of them changes a result.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RunOptions<'a> {
-    /// Where the run starts from.
+    /// Start of the run.
     pub start: StartFrom,
-    /// How often a checkpoint is written, instead of what the scene says.
+    /// Interval between checkpoints, instead of that of the scene.
     pub checkpoint_every: Option<Pace>,
     /// Set by another thread to end the run with a checkpoint: of the step at hand, or, where load steps take long, of the last one.
     pub interrupt: Option<&'a AtomicBool>,
@@ -103,7 +103,7 @@ pub struct RunOptions<'a> {
 }
 
 impl<'a> RunOptions<'a> {
-    /// Whether the run writes files.
+    /// Returns true if this process writes files.
     pub(crate) fn writes(&self) -> bool {
         self.ranks.is_none_or(|ranks| ranks.rank() == 0)
             && self.observer.is_none_or(Observer::wants_files)
@@ -140,7 +140,7 @@ pub const STILL: RunError = RunError::Later {
     remedy: "use AnyScene::run, which solves it",
 };
 
-/// Whether checkpoints are written by the clock.
+/// Returns true if checkpoints are written by the clock.
 fn paces_by_clock(solve: &Solve, options: &RunOptions<'_>) -> bool {
     let typed = match solve {
         Solve::Explicit(spec) => spec.checkpoint_every,

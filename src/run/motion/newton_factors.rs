@@ -1,4 +1,4 @@
-//! The factors, or the multigrid, that lead Newton's method in load steps.
+//! The factors, or the multigrid, that precondition Newton's method in load steps.
 
 use crate::coupling::{Model, Operator};
 use crate::observe::summary::Decision;
@@ -15,7 +15,7 @@ use crate::solve::statics::{self, StaticParams, StaticProblem};
 use crate::system::{BlockCsr, Symmetry};
 use crate::tensor::padded;
 
-/// What is added to the stiffness, as a part of its diagonal, so that pieces that nothing holds have factors too: far above round-off, and too little to
+/// Relative increase of the diagonal of the stiffness, so that pieces that nothing holds have factors too: far above round-off, and too little to
 /// cost an iteration.
 pub(super) const RAISED: f64 = 1e-10;
 
@@ -30,7 +30,7 @@ fn raised<const D: usize>(
     stiffness
 }
 
-/// The stiffness before bonds break, to lead Newton's method by multigrid.
+/// The stiffness before bonds break, to precondition Newton's method by multigrid.
 pub(super) struct CoarsenedStiffness {
     matrix: BlockCsr,
     free: FreeDofs,
@@ -84,7 +84,7 @@ pub(super) struct NewtonFactors {
 }
 
 impl NewtonFactors {
-    /// None where `[solver]` asks for an iteration, or `"auto"` finds factors dear.
+    /// None where `[solver]` asks for an iteration, or `"auto"` finds factors too costly.
     ///
     /// # Errors
     /// [`RunError`] for supports that meet no site, and for factors that are asked for and do not fit.
@@ -133,7 +133,7 @@ impl NewtonFactors {
         }))
     }
 
-    /// What makes factors of the tangent at a displacement; none where no element knows it.
+    /// Returns the factorisation of tangents at a displacement; none without nonlinear elements, and none with impactors.
     pub fn of_present_tangents(&self) -> Option<TangentFactors<'_>> {
         let problem = StaticProblem {
             stiffness: self.stiffness.as_ref()?,

@@ -136,7 +136,7 @@ fn newtons_method_converges_quadratically_in_bodies_of_elements() {
     }
 }
 
-/// Compares what forces differ by over a small displacement with the excess of elements and with the differences of all else.
+/// Compares the differences of forces over a small displacement with the excess of elements and with the differences of all else.
 struct Compare;
 
 impl Look for Compare {

@@ -1,4 +1,4 @@
-//! What the history tells of the probes.
+//! Columns of the history for the probes.
 
 use crate::coupling::Sampler;
 use crate::tensor::Vector;

@@ -159,7 +159,7 @@ fn load_steps<const D: usize>(
     })
 }
 
-/// What of a model stays linear or whole in load steps.
+/// Returns the parts of a model that stay linear or whole in load steps.
 fn linear_parts<'a, const D: usize>(
     of: &ModelSetup<'a, D>,
     options: &RunOptions<'a>,
@@ -198,7 +198,7 @@ fn recorder<'a, const D: usize>(
     )
 }
 
-/// Why a run that goes on from its checkpoint has come to its end there, where it has not finished.
+/// Returns the reason why a resumed run has ended at its checkpoint already; [`Ended::Finished`] if it has not.
 fn ended_before<const D: usize>(edge: Option<EdgeReached>, rest: &RunSettings<D>) -> Ended {
     match edge.is_some() && rest.breaking.at_edge == EdgeSpec::Stop {
         true => Ended::DamageAtEdge,
@@ -218,7 +218,7 @@ fn step_choice(spec: &Spec) -> StepChoice {
     }
 }
 
-/// How each load step finds its equilibrium.
+/// Returns the parameters by which each load step finds its equilibrium.
 fn equilibrium_params(spec: &Spec, choices: &mut Vec<Decision>) -> QuasiStaticParams {
     let params = QuasiStaticParams {
         equilibrium: match spec.method {
@@ -240,7 +240,7 @@ fn equilibrium_params(spec: &Spec, choices: &mut Vec<Decision>) -> QuasiStaticPa
     params
 }
 
-/// The state that the first load step begins with: what a checkpoint keeps (fields, time, step, work, broken bonds), and what the solver advances.
+/// The state that the first load step begins with: the one that a checkpoint keeps (fields, time, step, work, broken bonds), and the one that the solver advances.
 fn first_state(begin: State, saved: Option<Saved>) -> (State, LoadState) {
     let mut loaded = LoadState::at_rest(begin.u.len());
     let mut state = begin;
@@ -270,9 +270,9 @@ struct LoadStepObserver<'a, const D: usize> {
     parts: LinearParts<'a, D>,
     seen: Seen,
     doubts: DoubtfulEquilibria<'a, D>,
-    /// Fields, time, step, work, broken bonds of the last load step: what a checkpoint keeps.
+    /// Fields, time, step, work, broken bonds of the last load step, which a checkpoint keeps.
     state: State,
-    /// What the system kept of its damage then; nothing without an interrupt, which alone leads back there.
+    /// Damage state of the system at that load step; empty without an interrupt, which alone leads back there.
     last_damage: Vec<u64>,
     /// Products or passes of the load steps so far.
     iterations: usize,
@@ -285,7 +285,7 @@ struct LoadStepObserver<'a, const D: usize> {
 }
 
 impl<const D: usize> LoadStepObserver<'_, D> {
-    /// What the load steps took.
+    /// Returns the cost of the load steps.
     fn spent(&self) -> Decision {
         Decision {
             choice: format!("{} products or passes", self.iterations),
@@ -431,12 +431,12 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         }
     }
 
-    /// Whether the state is that of the last load step.
+    /// Returns true if the state is that of the last load step.
     fn is_last(&self) -> bool {
         self.state.step == self.pace.steps
     }
 
-    /// Why the run ends with this load step, if it does: damage at the edge, an interrupt, elements that have rotated too far.
+    /// Finds the reason, if any, to end the run with this load step: damage at the edge, an interrupt, elements that have rotated too far.
     fn find_reason_to_end(&mut self) {
         let interrupt = self.options.interrupt;
         if self.edge.is_some() && self.rest.breaking.at_edge == EdgeSpec::Stop {

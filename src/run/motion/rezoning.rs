@@ -1,4 +1,4 @@
-//! A change of the nonlocal zone in the middle of a motion: what is carried over, and what of energy and momentum the change costs.
+//! A change of the nonlocal zone in the middle of a motion: transfer of the state, and the energy and momentum that the change costs.
 
 use crate::coupling::{Carried, Model};
 use crate::fem;
@@ -8,7 +8,7 @@ use crate::solve::explicit::{Drive, State};
 use crate::system::SemiDiscrete;
 use crate::tensor::Vector;
 
-/// What a motion must keep over a change.
+/// Energies and momenta that a motion must keep over a change of the zone.
 #[derive(Clone, Debug)]
 struct Balance<const D: usize> {
     kinetic: f64,
@@ -25,7 +25,7 @@ impl<const D: usize> Balance<D> {
         Self::with(model, system, state, system.stored_energy(&state.u))
     }
 
-    /// With an energy of the displacement that is known.
+    /// With a stored energy that is known.
     fn with(model: &Model<D>, system: &dyn SemiDiscrete, state: &State, stored: f64) -> Self {
         let (low, high) = model.mesh.bounds();
         let middle = (low + high) * 0.5;
@@ -64,7 +64,7 @@ pub(crate) struct Leaving<const D: usize> {
 }
 
 impl<const D: usize> Leaving<D> {
-    /// Takes leave of a layout.
+    /// Records the state of a layout before the change.
     pub fn of(model: &Model<D>, system: &dyn SemiDiscrete, state: State) -> Self {
         Self {
             carried: Carried::of(model),
@@ -79,10 +79,10 @@ impl<const D: usize> Leaving<D> {
         &self.state
     }
 
-    /// Arrives at another layout: the state there, without accelerations, and what the change cost.
+    /// Arrives at another layout: returns the state there, without accelerations, and the record of the change.
     ///
-    /// The fields of new sites are fitted; a velocity of them all, supports left out, gives back the linear momentum that the fit has lost, and a scale of what their velocities differ by
-    /// the energy: short waves, which elements and points do not carry alike.
+    /// The fields of new sites are fitted. A uniform velocity of them, supports left out, restores the linear momentum that the fit has lost, and a scale of their velocities about the mean restores
+    /// the energy: that of short waves, which elements and points do not carry alike.
     ///
     /// # Errors
     /// [`RunError::Carry`] where there is nothing to fit to.
@@ -156,7 +156,7 @@ impl<const D: usize> Leaving<D> {
     }
 }
 
-/// Sites that were none before, with what of them may move freely.
+/// Sites that were none before, with their masses and held degrees of freedom.
 struct Fresh<'a, const D: usize> {
     sites: &'a [u32],
     mass: &'a [f64],
@@ -195,7 +195,7 @@ impl<const D: usize> Fresh<'_, D> {
         }
     }
 
-    /// Adds an energy by a scale of what velocities differ from their mean, so that the momentum stays; returns what was added, none if it is too much for them.
+    /// Adds an energy by a scale of the velocities about their mean, so that the momentum stays; returns the energy added, zero if it is too much for them.
     fn heat(&self, energy: f64, v: &mut [f64]) -> f64 {
         let means: Vec<Option<f64>> = (0..D).map(|axis| self.mean(axis, v)).collect();
         let differing: f64 = (0..D)
@@ -221,14 +221,14 @@ impl<const D: usize> Fresh<'_, D> {
     }
 }
 
-/// Which cells hold points.
+/// Returns true for each cell that holds points.
 pub(crate) fn nonlocal<const D: usize>(model: &Model<D>) -> Vec<bool> {
     (0..model.mesh.cell_count())
         .map(|c| !model.is_element(c))
         .collect()
 }
 
-/// What cells with points have of the volume of all.
+/// Returns the fraction of the volume of all cells that cells with points have.
 pub(crate) fn share<const D: usize>(model: &Model<D>) -> f64 {
     let (mut points, mut all) = (0.0, 0.0);
     for c in 0..model.mesh.cell_count() {

@@ -1,4 +1,4 @@
-//! What a checkpoint keeps of a run: its state, its step, its zone, and what was written until then.
+//! Content of a checkpoint of a run: its state, its step, its zone, and the extent of its output until then.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,28 +15,28 @@ use crate::solve::explicit::State;
 pub(crate) struct Saved {
     /// Fields, time, step, work, broken bonds.
     pub state: State,
-    /// What the system keeps of its damage.
+    /// Damage state of the system.
     pub damage: Vec<u64>,
-    /// The time step and what it was chosen by.
+    /// The time step and the limits that it was chosen by.
     pub pace: StepChoice,
-    /// What was written so far.
+    /// Extent of the output so far.
     pub written: Written,
-    /// When damage reached the edge of the nonlocal zone, if it did.
+    /// Arrival of damage at the edge of the nonlocal zone, if it got there.
     pub edge: Option<EdgeReached>,
-    /// Where a zone that follows the crack stands; none of one that does not.
+    /// State of a zone that follows the crack; none of one that does not.
     pub zone: Option<SavedZone>,
-    /// What was seen of energy and rotation.
+    /// Extremes of energy, rotation and strains so far.
     pub seen: Seen,
 }
 
-/// Where a zone that follows the crack stands.
+/// State of a zone that follows the crack.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SavedZone {
-    /// Whether each cell is nonlocal.
+    /// True for each cell that is nonlocal.
     pub nonlocal: Vec<bool>,
-    /// When each was wanted last \[s\], or became nonlocal; minus infinity if never.
+    /// Time at which each was wanted last \[s\], or became nonlocal; minus infinity if never.
     pub wanted: Vec<f64>,
-    /// Whether the state was looked at for a change already, where one is due.
+    /// True if the state was looked at for a change already, where one is due.
     pub looked: bool,
     /// The changes so far.
     pub switches: Vec<Switch>,
@@ -87,9 +87,9 @@ pub struct StepChoice {
     pub steps: u64,
     /// The largest step that is taken to be stable.
     pub stable: f64,
-    /// What row sums guarantee.
+    /// The step that row sums guarantee to be stable.
     pub certified: f64,
-    /// The site of the row that says so.
+    /// The site of the row that limits it.
     pub site: u64,
     /// The step and the time since when steps are of this size.
     pub since: (u64, f64),
@@ -113,7 +113,7 @@ pub struct EdgeReached {
     pub site: u64,
 }
 
-/// What of a run's files belongs to a state.
+/// Part of a run's files that belongs to a state, and the records that go with it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Written {
     /// Lengths of the history and of the tables beside it: tips, then lines.
@@ -124,6 +124,6 @@ pub struct Written {
     pub energy_at_start: f64,
     /// The largest forces of impactors so far.
     pub peaks: Vec<Peak>,
-    /// How far cracks grew.
+    /// Growth of cracks.
     pub growth: CrackGrowth,
 }

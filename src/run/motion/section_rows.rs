@@ -1,4 +1,4 @@
-//! What the history tells of the sections through the body.
+//! Columns of the history for the sections through the body.
 
 use crate::coupling::Model;
 use crate::observe::summary::SectionForce;
@@ -11,7 +11,7 @@ use crate::scene::section::Section;
 /// The sections of a scene, and their forces at the last row.
 pub(super) struct SectionRows<'a, const D: usize> {
     wanted: &'a [Section<D>],
-    /// What lies beyond each; none before the model is known.
+    /// Parts of the model beyond each; none before the model is known.
     found: Option<Sections<'a, D>>,
     /// Empty before the first row.
     last: Vec<SectionForce>,
@@ -31,7 +31,7 @@ impl<'a, const D: usize> SectionRows<'a, D> {
         sections::header(self.wanted)
     }
 
-    /// Finds what of a model lies beyond each section.
+    /// Finds the part of a model beyond each section.
     ///
     /// # Errors
     /// [`RunError::EmptySection`].

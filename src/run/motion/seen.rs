@@ -1,21 +1,21 @@
-//! What a run has seen of its energy, of rotation and of strains so far, which a checkpoint keeps.
+//! Extremes of energy, rotation and strains in a run so far, which a checkpoint keeps.
 
 use serde::{Deserialize, Serialize};
 
 use crate::run::linear_parts::Passed;
 
-/// What was seen so far: part of a checkpoint.
+/// Extremes so far: part of a checkpoint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seen {
     /// The largest energy or work so far.
     pub(super) largest: f64,
-    /// Where the gain went beyond [`TOLD`]: part, step, time.
+    /// First gain beyond [`TOLD`]: relative gain, step, time.
     pub(super) told: Option<(f64, u64, f64)>,
-    /// The largest gain: part, step, time.
+    /// The largest gain: relative gain, step, time.
     pub(super) most: Option<(f64, u64, f64)>,
     /// The largest rotation: degrees, cell, step, time, and the strain energy that it costs.
     pub(super) rotated: Option<Rotated>,
-    /// What passed the limits of what is linear furthest.
+    /// Largest excesses over the limits of linear parts.
     pub(super) passed: Passed,
 }
 

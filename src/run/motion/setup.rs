@@ -1,4 +1,4 @@
-//! What every scene that moves begins with: the model, its rows and bonds, and the checkpoint that it goes on from.
+//! Set-up of every run in time or in load steps: the model, its rows and bonds, and the checkpoint that it goes on from.
 
 use super::dynamic_system::{DynamicSystem, LayoutStart, dynamic};
 use super::guard::energies_are_apart;
@@ -24,25 +24,25 @@ use crate::system::{Ranks, SemiDiscrete, WithTerms};
 pub struct ModelSetup<'a, const D: usize> {
     /// The title of the scene.
     pub title: String,
-    /// How its bodies are coupled.
+    /// Coupling of its bodies.
     pub traits: CouplingTraits,
-    /// What to change in the scene where a mode may grow.
+    /// Change of the scene that helps where a mode may grow.
     pub remedy: &'static str,
-    /// What shows that no mode grows, if anything does.
+    /// Evidence that no mode grows, if there is any.
     pub proved: Option<&'static str>,
     /// Sites, families and zones.
     pub model: &'a Model<D>,
     /// Rows of the stiffness.
     pub operator: &'a dyn Operator<D>,
-    /// What the run keeps of the scene.
+    /// Settings that the run keeps of the scene.
     pub rest: &'a RunSettings<D>,
-    /// The system that solvers see.
+    /// The system that solvers see, with its properties.
     pub moving: DynamicSystem<'a>,
-    /// What springs hold the body; the system has them.
+    /// Springs that hold the body; the system has them.
     pub(crate) terms: Arc<ConditionTerms>,
-    /// What the program chose where the scene leaves it open.
+    /// Choices of the program where the scene leaves them open.
     pub choices: Vec<Decision>,
-    /// What was shown about the model.
+    /// Results of the proof of the model.
     pub proof: Proof,
     /// Memory that the program held when sites and bonds were there.
     pub bytes: u64,
@@ -52,7 +52,7 @@ pub struct ModelSetup<'a, const D: usize> {
     pub watch: Stopwatch,
 }
 
-/// A run before its zones are laid out: what stays when they change.
+/// A run before its zones are laid out: the data that stay when they change.
 pub(crate) struct RunSetup {
     pub title: String,
     pub traits: CouplingTraits,

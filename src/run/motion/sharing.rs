@@ -1,4 +1,4 @@
-//! What each of several processes has of a run.
+//! Distribution of a run over several processes.
 
 use super::RunOptions;
 use crate::coupling::Problem;
@@ -8,7 +8,7 @@ use crate::scene::solve::Explicit;
 use crate::scene::spec::{ElementsSpec, PrecisionSpec};
 use crate::system::{Ranks, all_say};
 
-/// What each process of a run in time has to itself, where the system lets it.
+/// Parts of a run in time that each process has to itself, where the system lets it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Sharing {
     /// Nothing: all processes have the numbers of all sites in every step.
@@ -20,8 +20,8 @@ pub(crate) enum Sharing {
     Families,
 }
 
-/// How many families deep from the elements every process needs those of all points, where each may hold those of its own sites alone elsewhere; none where a scene asks for all. What of an output or of a step
-/// takes bonds one by one, beside strains of points along lines and in VTU files, takes those of all.
+/// Returns the depth, in families from the elements, to which every process needs those of all points, where each may hold those of its own sites alone elsewhere; none where a scene asks for all. Outputs and parts of a step that
+/// take bonds one by one, beside strains of points along lines and in VTU files, take those of all.
 fn families_of_all<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) -> Option<usize> {
     let p = problem.peridynamics.as_ref()?;
     let asks_for_own = p.accelerator().is_some()
@@ -36,12 +36,12 @@ fn families_of_all<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) 
     (coupling.families_of_all(p.law.linearised())).filter(|_| asks_for_own)
 }
 
-/// Whether each process of a scene in time may hold the families of its own sites alone.
+/// Returns true if each process of a scene in time may hold the families of its own sites alone.
 pub(crate) fn may_share<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) -> bool {
     problem.coupling.moves_with_own_families() && families_of_all(problem, rest).is_some()
 }
 
-/// Whether each process of a static scene may, beside those at a seam. Forces then have to be linear: of others each process has the rows of all sites.
+/// Returns true if each process of a static scene may do so, beside the families at a seam. Forces then have to be linear: of others each process has the rows of all sites.
 pub(crate) fn may_share_rows<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) -> bool {
     let law = problem.peridynamics.as_ref().map(|p| &p.law);
     rest.kinematics() == BondKinematics::Linear
@@ -59,13 +59,13 @@ pub(crate) fn holders_at_rest<'a, const D: usize>(
     ranks.filter(|&ranks| all_say(ranks, may_share_rows(problem, rest)))
 }
 
-/// Whether a process then moves its own sites and their ghosts alone, and not all: no sub-steps, no springs, nothing that strikes.
+/// Returns true if a process then moves its own sites and their ghosts alone, and not all: no sub-steps, no springs, no impactors.
 pub(crate) fn moves_own_sites<const D: usize>(spec: &Explicit, rest: &RunSettings<D>) -> bool {
     let mut conditions = rest.conditions.iter();
     spec.sub_steps.is_none() && rest.impactors.is_empty() && conditions.all(|c| c.term().is_none())
 }
 
-/// Collective: what the processes of a run share; no more than any of them can, and nothing where somebody looks at each step.
+/// Collective: the sharing of a run by its processes; no more than any of them can, and nothing where an observer looks at each step.
 pub(super) fn sharing<const D: usize>(
     problem: &Problem<D>,
     rest: &RunSettings<D>,

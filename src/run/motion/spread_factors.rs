@@ -1,4 +1,4 @@
-//! What leads Newton's method in load steps: factors of one process, or of several, of which each holds its part, or multigrid.
+//! Preconditioners of Newton's method in load steps: factors of one process, or of several, of which each holds its part, or multigrid.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -18,7 +18,7 @@ use crate::system::{
 };
 use crate::tensor::padded;
 
-/// Lead of Newton's method: factors of this process, factors over all, multigrid, or nothing.
+/// Preconditioner of Newton's method: factors of this process, factors over all, multigrid, or nothing.
 pub(super) struct Leads<'a> {
     own: Option<NewtonFactors>,
     spread: Option<SpreadStiffness<'a>>,
@@ -79,13 +79,13 @@ impl<'a> Leads<'a> {
         }
     }
 
-    /// The inverse that leads, if there is one; `made` is that of [`Leads::made`].
+    /// Returns the approximate inverse that preconditions, if there is one; `made` is that of [`Leads::made`].
     pub fn lead<'b>(&'b self, made: Option<&'b dyn LinearMap>) -> Option<&'b dyn LinearMap> {
         let own = self.own.as_ref().map(|own| &own.factor as &dyn LinearMap);
         own.or(made)
     }
 
-    /// What makes factors of the tangent at a displacement, of this process alone.
+    /// Returns the factorisation of tangents at a displacement, of this process alone.
     pub fn of_present_tangents(&self) -> Option<TangentFactors<'_>> {
         self.own.as_ref()?.of_present_tangents()
     }

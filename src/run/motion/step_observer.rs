@@ -1,4 +1,4 @@
-//! What follows each time step: damage at the edge of the zone, the zone, energies and rotations are looked at, and rows, files and checkpoints are written.
+//! Observation of each time step: damage at the edge of the zone, the zone, energies and rotations are looked at, and rows, files and checkpoints are written.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
@@ -29,17 +29,17 @@ use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::EdgeSpec;
 use crate::solve::explicit::{Explicit, State};
 
-/// How often whoever watches is told.
+/// Interval between reports of progress.
 const TOLD_EVERY: Duration = Duration::from_millis(200);
 
-/// Whether an instant of a regular sequence lies in the step from `before` to `after`.
+/// Returns true if an instant of a regular sequence lies in the step from `before` to `after`.
 fn is_due(before: f64, after: f64, interval: f64) -> bool {
     // an instant that falls on the end of a step belongs to it, whatever rounding says
     let count = |t: f64| (t / interval * (1.0 + 1e-12) + 1e-9).floor();
     count(after) > count(before)
 }
 
-/// Why the run loop was left early.
+/// Reason to leave the run loop early.
 pub(super) enum Stop {
     /// Something could not be written.
     Failed(ObserveError),
@@ -49,7 +49,7 @@ pub(super) enum Stop {
     Switch(Vec<bool>),
 }
 
-/// What does not change while steps are taken with one layout of the zones.
+/// Data that do not change while steps are taken with one layout of the zones.
 pub(super) struct Segment<'a, 'r, const D: usize> {
     pub model: &'a Model<D>,
     pub operator: &'a dyn Operator<D>,
@@ -72,7 +72,7 @@ pub(super) struct FieldOutput<'a, const D: usize> {
     zone_of_site: Vec<crate::coupling::Zone>,
     stresses: &'a StressSettings<D>,
     probes: FieldProbes,
-    /// What each of several processes shows of them.
+    /// Piece of them that this one of several processes shows.
     piece: Option<Piece>,
 }
 
@@ -146,7 +146,7 @@ impl<'a, const D: usize> FieldOutput<'a, D> {
     }
 }
 
-/// What was seen before the first step of a segment.
+/// Observations before the first step of a segment.
 pub(super) struct Watched {
     pub balance: Balance,
     pub seen: Seen,
@@ -158,17 +158,17 @@ pub(super) struct Watched {
 pub(super) struct StepObserver<'a, 'r, const D: usize> {
     pub segment: &'a Segment<'a, 'r, D>,
     fields: FieldOutput<'a, D>,
-    /// Where a zone that follows the crack is wanted.
+    /// Monitor of a zone that follows the crack.
     monitor: Option<ZoneMonitor<'a, D>>,
     pub guard: Guard<'a, D>,
     pub recorder: Recorder<'r, D>,
     pub edge: Option<EdgeReached>,
     pub zone: Option<SavedZone>,
-    /// What the first output that shows such tells of steep stresses.
+    /// Warnings of steep stresses, from the first output that shows such.
     pub steep: Vec<String>,
-    /// Why the steps were left early.
+    /// Reason for which the steps were left early.
     pub stop: Option<Stop>,
-    /// Whether a checkpoint was due with the change of the zone: of the state in the next layout.
+    /// True if a checkpoint was due with the change of the zone: of the state in the next layout.
     pub is_late: bool,
     /// Broken bonds when damage was last looked for at the edge.
     known_broken: u64,
@@ -263,7 +263,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         Ok(())
     }
 
-    /// Why a run that goes on from its checkpoint has come to its end there, as long as the scene has the same limits.
+    /// Returns the reason for which a resumed run has ended at its checkpoint already, as long as the scene has the same limits.
     fn ended_before(&self) -> Option<Ended> {
         match self.edge.is_some() && self.segment.rest.breaking.at_edge == EdgeSpec::Stop {
             true => Some(Ended::DamageAtEdge),
@@ -374,7 +374,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         ControlFlow::Break(())
     }
 
-    /// Whether something asks for all sites after a step, be it on another process: a row, a file, a checkpoint, a look at energies, rotations or the zone.
+    /// Returns true if something asks for all sites after a step, be it on another process: a row, a file, a checkpoint, a look at energies, rotations or the zone.
     fn asks_for_all(&self, step: u64) -> bool {
         let Segment { spec, pace, .. } = *self.segment;
         let (before, after) = (pace.time(step - 1), pace.time(step));
@@ -440,7 +440,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         next
     }
 
-    /// Why the run ends with this step, if it does: damage at the edge, an energy or a rotation beyond its limit, an interrupt.
+    /// Returns the reason, if any, to end the run with this step: damage at the edge, an energy or a rotation beyond its limit, an interrupt.
     fn reason_to_end(
         &mut self,
         moment: &Moment<'_>,
@@ -461,7 +461,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         }
     }
 
-    /// Writes what is due of a step: a row of the history, the fields, a checkpoint.
+    /// Writes the output that is due after a step: a row of the history, the fields, a checkpoint.
     fn write(
         &mut self,
         moment: &Moment<'_>,
@@ -526,7 +526,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         )
     }
 
-    /// Tells whoever watches where the run stands, a few times a second.
+    /// Reports the progress of the run, a few times a second.
     fn tell_progress(&mut self, state: &State) {
         let Segment {
             progress, breaks, ..
@@ -549,7 +549,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
     }
 }
 
-/// What is to be written of a step.
+/// Output that is due after a step.
 struct DueOutput {
     /// A row of the history.
     row: bool,
@@ -557,7 +557,7 @@ struct DueOutput {
     fields: bool,
     /// A checkpoint, for the run ends here.
     must_save: bool,
-    /// Whether the zone changes: a checkpoint is then one of the next layout.
+    /// True if the zone changes: a checkpoint is then one of the next layout.
     changes: bool,
 }
 

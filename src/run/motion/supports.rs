@@ -1,4 +1,4 @@
-//! What holds the body: the force of each condition that prescribes how sites move, and by how much it has moved them.
+//! Supports of the body: the force of each condition that prescribes the motion of sites, and the displacement that it has given them.
 
 #![deny(clippy::wildcard_enum_match_arm)]
 
@@ -17,7 +17,7 @@ pub(super) struct Supports<const D: usize> {
     holders: Vec<(u32, u32)>,
     /// The conditions that are springs, by their names.
     term_names: Vec<String>,
-    /// What they hold; none before the model is known.
+    /// The springs themselves; none before the model is known.
     terms: Option<Arc<ConditionTerms>>,
     /// Forces of the springs at the last row.
     last_of_terms: Vec<Reaction>,
@@ -29,7 +29,7 @@ struct Support<const D: usize> {
     /// Its number among all conditions.
     number: u32,
     name: String,
-    /// Along which axes it prescribes anything.
+    /// True for each axis along which it prescribes anything.
     prescribes: [bool; D],
 }
 
@@ -69,17 +69,17 @@ impl<const D: usize> Supports<D> {
         self.holders.iter().map(|(dof, _)| *dof)
     }
 
-    /// Takes what springs hold the body.
+    /// Takes the springs that hold the body.
     pub fn take_terms(&mut self, terms: Arc<ConditionTerms>) {
         self.terms = Some(terms);
     }
 
-    /// What springs hold the body, if that is known.
+    /// Returns the springs that hold the body, if they are known.
     pub fn terms(&self) -> Option<&ConditionTerms> {
         self.terms.as_deref()
     }
 
-    /// The columns of a row: all reactions, then the displacements of what is prescribed, then the forces of springs.
+    /// The columns of a row: all reactions, then the displacements that are prescribed, then the forces of springs.
     pub fn header(&self) -> Vec<String> {
         let of_all = self.conditions.iter();
         let mut header: Vec<String> = of_all

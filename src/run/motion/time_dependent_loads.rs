@@ -1,4 +1,4 @@
-//! What drives a scene: its loads and prescribed motion as functions of time.
+//! Loads and prescribed motion of a scene as functions of time.
 
 #![deny(clippy::wildcard_enum_match_arm)]
 
@@ -18,7 +18,7 @@ use crate::tensor::Vector;
 
 /// The conditions of a scene on the sites of its model.
 ///
-/// What does not change with time is evaluated once; what depends on time alone, once per step and condition; the rest
+/// Conditions that do not change with time are evaluated once; those that depend on time alone, once per step and condition; the rest
 /// at every place and every step.
 pub struct SceneDrive<'a, const D: usize> {
     model: &'a Model<D>,
@@ -39,7 +39,7 @@ pub struct SceneDrive<'a, const D: usize> {
     start: Vec<f64>,
     /// The way of each prescribed velocity that changes with time, by condition and axis.
     ways: Vec<[Option<Way>; D]>,
-    /// What functions of position hold.
+    /// Prescribed dofs held by functions of position.
     functions: Vec<FunctionTarget>,
     /// Impactors whose motion is prescribed; their dofs are the last.
     impactors: Option<DrivenImpactors<'a, D>>,
@@ -54,7 +54,7 @@ struct FunctionTarget {
     places: Vec<usize>,
 }
 
-/// What functions hold.
+/// Finds the prescribed dofs that each function of position holds.
 fn function_targets<const D: usize>(
     conditions: &[Condition<D>],
     prescribed: &[u32],
@@ -95,7 +95,7 @@ struct TimedLoad {
 impl<'a, const D: usize> SceneDrive<'a, D> {
     /// The conditions of a scene over `steps` steps of `step`, from the displacement `start` of all dofs.
     ///
-    /// `body_forces` says how finite elements share body forces out.
+    /// `body_forces` says how finite elements distribute body forces to their nodes.
     ///
     /// # Errors
     /// [`RunError::Idle`] for a condition that meets no site.
@@ -204,7 +204,7 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
             .zip(self.holder.iter().copied())
     }
 
-    /// Whether a load changes with place and time, so that it is evaluated everywhere at every step.
+    /// Returns true if a load changes with place and time, so that it is evaluated everywhere at every step.
     pub fn evaluates_everywhere(&self) -> bool {
         !self.by_both.is_empty()
     }

@@ -1,4 +1,4 @@
-//! The time step of a run: the stable one of what moves, sub-cycled where the scene wants it.
+//! The time step of a run: the stable one of the dynamic system, sub-cycled where the scene wants it.
 
 use super::dynamic_system::DynamicSystem;
 use super::saved::StepChoice;
@@ -15,7 +15,7 @@ use crate::solve::stable_step::{Held, StepLimit, stable_step, stable_step_beyond
 use crate::solve::sub_cycling::{FineSites, SubCycled, SubCyclingError};
 use crate::system::SemiDiscrete;
 
-/// What moves with its time step, that of a checkpoint if it is `known`.
+/// Chooses the time step of a dynamic system, that of a checkpoint if it is `known`, with sub-cycling where the scene wants it.
 ///
 /// # Errors
 /// [`RunError::Step`] for a step beyond the stable one or a motion that grows, [`RunError::SubCycling`].
@@ -96,7 +96,7 @@ pub fn paced<'a>(
     Ok((moving, pace, growth))
 }
 
-/// The time step after a change of what moves: the one before, or a shorter one if that is beyond the fraction of the stable step now.
+/// The time step after a change of the dynamic system: the one before, or a shorter one if that is beyond the fraction of the stable step now.
 ///
 /// # Errors
 /// [`RunError::Step`] if no stable step is found.

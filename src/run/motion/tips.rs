@@ -1,4 +1,4 @@
-//! Where the tip of a crack is.
+//! Position of a crack tip.
 
 use crate::scene::validated::Tip;
 use crate::tensor::Vector;

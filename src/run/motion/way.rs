@@ -1,4 +1,4 @@
-//! The way of a velocity that is given as a function of time.
+//! Displacement (way) by a velocity that is given as a function of time.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -13,7 +13,7 @@ pub(super) struct Way {
     known: Mutex<Known>,
 }
 
-/// What is known of a way: the sum after so many steps, and after every [`MARK`]-th step before.
+/// Known part of a way: the sum after so many steps, and after every [`MARK`]-th step before.
 struct Known {
     after: u64,
     sum: f64,

@@ -1,4 +1,4 @@
-//! What a run writes while it goes on: history, VTU files, lines, tips of cracks, checkpoints.
+//! Output during a run: history, VTU files, lines, tips of cracks, checkpoints.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -37,11 +37,11 @@ use crate::tensor::Vector;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// A state to tell of.
+/// A state to be written.
 pub struct Moment<'a> {
     /// Fields, time, step, work, broken bonds.
     pub state: &'a State,
-    /// What moves.
+    /// The system of the body.
     pub system: &'a dyn SemiDiscrete,
     /// Kinetic energy.
     pub kinetic: f64,
@@ -106,17 +106,17 @@ pub struct EnergyRow {
     pub work: f64,
     /// Of broken bonds.
     pub dissipated: f64,
-    /// What the three leave over: energy of broken bonds, and what the seam takes.
+    /// Deficit of the balance of kinetic energy, stored energy and work: energy of broken bonds, and that which the seam takes.
     pub missing: f64,
 }
 
-/// What a run writes.
+/// Recorder of the output of a run.
 pub struct Recorder<'a, const D: usize> {
     output: &'a Output<D>,
     probes: ProbeRows<'a, D>,
     supports: Supports<D>,
     sections: SectionRows<'a, D>,
-    /// What is told of impactors, if there are any.
+    /// Record of impactors, if there are any.
     pub impact: Option<ImpactRecord<D>>,
     breaks: Breaks,
     history: History,
@@ -129,7 +129,7 @@ pub struct Recorder<'a, const D: usize> {
     pub energy_at_start: f64,
     /// Energies of the last row.
     pub last: EnergyRow,
-    /// How far cracks grew between rows.
+    /// Growth of cracks between rows.
     pub growth: CrackGrowth,
     /// Seconds that writing took.
     pub seconds: f64,
@@ -187,7 +187,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         self.probes.find(sampler);
     }
 
-    /// Finds what of a model lies beyond each section, and takes what springs hold it.
+    /// Finds the part of a model beyond each section, and takes the springs that hold the model.
     ///
     /// # Errors
     /// [`RunError::EmptySection`].
@@ -372,12 +372,12 @@ impl<'a, const D: usize> Recorder<'a, D> {
         Ok(())
     }
 
-    /// Whether a checkpoint is due after `step` steps on the process that writes it.
+    /// Returns true if a checkpoint is due after `step` steps on the process that writes it.
     pub fn is_checkpoint_step(&self, step: u64) -> bool {
         matches!(self.options.checkpoint_every, Some(Pace::Steps(n)) if step.is_multiple_of(n))
     }
 
-    /// Whether a checkpoint is due after `step` steps.
+    /// Returns true if this process has to write a checkpoint after `step` steps.
     pub fn is_checkpoint_due(&self, step: u64) -> bool {
         match self.options.checkpoint_every {
             _ if !self.options.writes() => false,
@@ -387,7 +387,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         }
     }
 
-    /// Whether the end of the run leaves a checkpoint: one is asked for, or an older one would be left behind.
+    /// Returns true if the end of the run leaves a checkpoint: one is asked for, or an older one would be left behind.
     pub fn keeps_state(&self) -> bool {
         let asked = self.options.checkpoint_every.is_some();
         self.options.writes() && (asked || self.checkpoint.path().exists())
@@ -453,7 +453,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
     }
 }
 
-/// The files of a run, cut back to what was `written` at a checkpoint; what an earlier run left goes.
+/// The files of a run, cut back to what was `written` at a checkpoint; those of an earlier run are removed.
 fn files_begun<const D: usize>(
     output: &Output<D>,
     header: Vec<String>,

@@ -1,4 +1,4 @@
-//! Where a zone that follows the crack is wanted, and when that is looked at.
+//! Monitor of a zone that follows the crack: the cells that are wanted in it, and the steps at which they are looked for.
 
 use super::bounding_boxes::CellBoxes;
 use crate::fem;
@@ -33,17 +33,17 @@ const LOOKED_AT: [f64; 2] = [0.5, 0.75];
 pub(crate) struct ZoneMonitor<'a, const D: usize> {
     follow: &'a Follow,
     model: &'a Model<D>,
-    /// Stretch from which a cell is wanted, and beyond which a bond is broken.
+    /// Stretch beyond which a cell is wanted, and beyond which a bond is broken.
     limits: [f64; 2],
     /// Steps between looks.
     every: u64,
-    /// How far a crack comes in a step \[m\].
+    /// Travel of a crack in a step \[m\].
     travel: f64,
-    /// How long a cell stays wanted \[s\].
+    /// Time for which a cell stays wanted \[s\].
     remembered: f64,
     /// Bonds to look at, by their points, with their lengths squared \[m²\]; first those of the rim.
     bonds: Vec<([u32; 2], f64)>,
-    /// How many of them are of the rim: with an end in a cell within the reach, and the way of a crack between two looks, of cells that may become nonlocal.
+    /// Number of bonds of the rim: with an end in a cell within the reach, and the travel of a crack between two looks, of cells that may become nonlocal.
     of_rim: usize,
     /// The cells at whose boxes each site lies that is a point, several for one on a face, and where those of each begin.
     cells_at: Vec<u32>,
@@ -55,7 +55,7 @@ pub(crate) struct ZoneMonitor<'a, const D: usize> {
     /// Elements with the sites and weights of the gradient at their centres.
     elements: Vec<u32>,
     gradients: Vec<(u32, Vector<D>)>,
-    /// Where those of each element begin.
+    /// Offsets of those of each element.
     offsets: Vec<usize>,
     /// The site of each point; `u32::MAX` for one that follows sites.
     site_of_point: Vec<u32>,
@@ -179,12 +179,12 @@ impl<'a, const D: usize> ZoneMonitor<'a, D> {
         self.bonds.extend(rest);
     }
 
-    /// How far a crack comes until the next look, or until the run ends in so many steps \[m\].
+    /// Returns the travel of a crack until the next look, or until the run ends in so many steps \[m\].
     fn way(&self, left: u64) -> f64 {
         self.travel * self.every.min(left) as f64
     }
 
-    /// Whether a step ends with a look, and with one at the whole zone.
+    /// Tests if a step ends with a look, and with one at the whole zone.
     pub fn looks_after(&self, step: u64) -> [bool; 2] {
         [self.every, self.every.saturating_mul(WHOLE)].map(|n| step.is_multiple_of(n))
     }
@@ -354,7 +354,7 @@ impl<'a, const D: usize> ZoneMonitor<'a, D> {
         found
     }
 
-    /// Marks what lies ahead of the tips of cracks: groups of cells at the front, moved away from the damage behind them.
+    /// Marks the cells ahead of the tips of cracks: groups of cells at the front, moved away from the damage behind them.
     fn mark_ahead(&self, front: &[bool], damaged: &[bool], marked: &mut [bool]) {
         let Follow {
             reach,

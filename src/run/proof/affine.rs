@@ -1,4 +1,4 @@
-//! Affine fields through the model of a scene: whether each row balances a constant stress, and by how much the stress is wrong where it does not.
+//! Affine fields through the model of a scene: the balance of each row under a constant stress, and the error of the stress where a row is out of balance.
 
 use super::classes::{Layout, RowClass, Skin, Unbalanced, limits, told};
 use super::fields::{boundary_integrals, gradients, nodal_forces, of_stress};
@@ -22,7 +22,7 @@ const CLASSIFIED: usize = 20_000;
 /// Relative difference up to which the forces of two rows count as alike.
 const ALIKE: f64 = 1.0e-6;
 
-/// What is proved, with what several steps of it ask for.
+/// Subject of the proof, with data that several of its steps need.
 struct Subject<'a, const D: usize> {
     model: &'a Model<D>,
     operator: &'a dyn Operator<D>,
@@ -32,7 +32,7 @@ struct Subject<'a, const D: usize> {
     holder: Vec<Option<usize>>,
     /// Sites with broken bonds, ascending.
     damaged: Vec<u32>,
-    /// Whether all sites are points: no row is one of a seam, whatever its columns.
+    /// True if all sites are points: no row is one of a seam, whatever its columns.
     has_points_alone: bool,
     /// The sites over processes, where families are spread over these.
     spread: Option<Spread<'a>>,
@@ -196,7 +196,7 @@ fn is_point<const D: usize>(site: &Site<D>) -> bool {
     matches!(site.kind, SiteKind::Point(_))
 }
 
-/// How far from the boundary rows may lack bonds \[m\].
+/// Returns the distance from the boundary within which rows may lack bonds \[m\].
 fn reach<const D: usize>(model: &Model<D>) -> f64 {
     let largest = model.body().map_or(0.0, |b| b.cloud.horizon.largest());
     let alone = model
@@ -208,7 +208,7 @@ fn reach<const D: usize>(model: &Model<D>) -> f64 {
     (if alone { 1.0 } else { 2.0 }) * largest * (1.0 + 1e-6)
 }
 
-/// How much farther than a family the bonds reach whose ends on faces a node carries a part of \[m\].
+/// Returns the reach beyond a family of those bonds whose ends on faces are carried in part by a node \[m\].
 fn cut_bonds_reach<const D: usize>(model: &Model<D>, site: u32) -> f64 {
     if !model.faces_cut_bonds() || model.point_of(site as usize).is_some() {
         return 0.0;
@@ -223,7 +223,7 @@ fn cut_bonds_reach<const D: usize>(model: &Model<D>, site: u32) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// What a row is, the facet that it lies at, and whether no other surface is near.
+/// The class of a row, the facet that it lies at, and true if no other surface is near.
 type Class = (RowClass, Option<usize>, bool);
 
 /// A class as numbers, for other processes.
@@ -238,7 +238,7 @@ fn class_of_numbers(numbers: &[f64]) -> Class {
     (RowClass::numbered(numbers[0]), facet, numbers[2] == 1.0)
 }
 
-/// The rows that are out of balance by what they are, and what the stress at them is predicted with.
+/// The rows that are out of balance by their classes, and the data by which the stress at them is predicted.
 struct Classified<'a, const D: usize> {
     subject: &'a Subject<'a, D>,
     around: &'a Around<'a, D>,
@@ -246,12 +246,12 @@ struct Classified<'a, const D: usize> {
     nodal: &'a dyn Fn(&Tensor<D>, &mut [f64]),
     /// Rows out of balance, with the class of each.
     rows: Vec<(u32, Class)>,
-    /// By how much each row is out of balance.
+    /// Imbalance of each row.
     worst: &'a [f64],
 }
 
 impl<const D: usize> Classified<'_, D> {
-    /// By how much a row is out of balance: what is not a number is largest.
+    /// Returns the imbalance of a row; not a number counts as the largest.
     fn size(&self, s: u32) -> f64 {
         match self.worst[s as usize] {
             r if r.is_nan() => f64::INFINITY,
@@ -473,11 +473,11 @@ fn class<const D: usize>(
     (class, facet, is_alone)
 }
 
-/// What is known of the stress around a row.
+/// Prediction of the error of the stress around a row.
 enum Predicted<const D: usize> {
-    /// There is no field to ask by.
+    /// There is no field to predict it with.
     NotAsked,
-    /// The patch does not tell.
+    /// The patch gives no prediction.
     Unknown,
     Error(StressError<D>),
 }
@@ -548,7 +548,7 @@ fn predicted<const D: usize>(
         .map_or(Predicted::NotAsked, Predicted::Error)
 }
 
-/// By how much the displacement that a support prescribes at a point off its facets differs from that of a field which the facets keep: points of the first layer lie up
+/// Returns the difference of the displacement that a support prescribes at a point off its facets from that of a field which the facets keep: points of the first layer lie up
 /// to half a spacing inside, and take the value of the facet all the same.
 fn mismatch<const D: usize>(
     subject: &Subject<'_, D>,

@@ -1,4 +1,4 @@
-//! Rows that affine fields leave out of balance: their classes, limits, and what is told of them.
+//! Rows that affine fields leave out of balance: their classes, limits, and the findings on them.
 
 use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::observe::report::number;
@@ -11,7 +11,7 @@ pub(super) mod limits {
     pub const NEGLIGIBLE: f64 = 1e-5;
     /// Relative error of the stress at the seam, or among points, from which a run warns.
     pub const WARN: f64 = 0.005;
-    /// And from which it is refused.
+    /// Relative error of the stress there, from which a run is refused.
     pub const REFUSE: f64 = 0.5;
     /// As [`WARN`], at free surfaces and supports that cross the peridynamic zone.
     pub const WARN_SURFACE: f64 = 0.02;
@@ -27,7 +27,7 @@ pub(super) mod limits {
     pub const REFUSE_TRANSITION: f64 = 1.0;
 }
 
-/// Where rows that an affine field leaves out of balance lie.
+/// Class of a row that an affine field leaves out of balance, by its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum RowClass {
     /// Elements and points meet in the row.
@@ -78,26 +78,26 @@ impl RowClass {
 /// Rows of one class that affine fields leave out of balance.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Unbalanced {
-    /// Where they lie.
+    /// Class of the rows, by their place.
     pub class: RowClass,
-    /// How many.
+    /// Number of rows.
     pub rows: usize,
     /// Largest force per volume, over the stress of the field per spacing.
     pub residual: f64,
-    /// Where.
+    /// Position of the row with that force.
     pub at: Vec<f64>,
     /// Predicted error of the stress, over that of the field; signed where it is that of the component which the field has. None where it is not predicted.
     pub stress_error: Option<f64>,
-    /// Whether it was asked for in vain: other surfaces cut all families around, or the patch has no unique solution.
+    /// True if the prediction failed: other surfaces cut all families around, or the patch has no unique solution.
     pub is_unpredictable: bool,
-    /// Where the stress is wrong.
+    /// Position of that error of the stress.
     pub stress_at: Vec<f64>,
 }
 
-/// Whether a layer of elements could cover the surfaces at which families lack points.
+/// Possibility of a layer of elements over the surfaces at which families lack points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Skin {
-    /// `zones.skin` would.
+    /// `zones.skin` would lay one.
     Possible,
     /// A crack or void passes through the cells there, and elements carry neither.
     Crossed,
@@ -106,7 +106,7 @@ pub(super) enum Skin {
 }
 
 impl Skin {
-    /// What to do about surfaces, in words.
+    /// Returns the remedy for surfaces, in words.
     fn remedy(self) -> &'static str {
         match self {
             Self::Possible => {
@@ -134,18 +134,18 @@ impl Skin {
     }
 }
 
-/// What of a model decides which remedies there are.
+/// Properties of a model that decide which remedies there are.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layout {
-    /// Whether points lie on a lattice.
+    /// True if points lie on a lattice.
     pub is_lattice: bool,
-    /// Whether bonds end on the faces of elements.
+    /// True if bonds end on the faces of elements.
     pub is_truncated: bool,
-    /// Whether elements could lie at surfaces.
+    /// Possibility of elements at surfaces.
     pub skin: Skin,
 }
 
-/// What the proof has shown, as data.
+/// Returns the results of this part of the proof, as data.
 pub(super) fn told(
     fields: usize,
     residual: f64,
@@ -190,7 +190,7 @@ pub(super) fn told(
 }
 
 impl RowClass {
-    /// Where such rows lie, in words.
+    /// Returns the place of such rows, in words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Seam => "at the seam",
@@ -206,7 +206,7 @@ impl RowClass {
     }
 }
 
-/// Where rows of a class are, what to do about them, and from which error on they are warned of and refused; none of rows at a crack.
+/// Returns the place of the rows of a class, the remedy, and the errors from which on they are warned of and refused; none of rows at cracks, voids and borders of materials.
 fn described(class: RowClass, layout: Layout) -> Option<(&'static str, &'static str, [f64; 2])> {
     let Layout {
         is_lattice,
@@ -268,7 +268,7 @@ fn described(class: RowClass, layout: Layout) -> Option<(&'static str, &'static 
     })
 }
 
-/// What is told of a class of rows.
+/// Returns the finding on a class of rows, if there is one.
 fn verdict(rows: &Unbalanced, layout: Layout) -> Option<Finding> {
     let place = |x: &[f64]| {
         let x: Vec<String> = x.iter().map(|x| format!("{x:.4e}")).collect();

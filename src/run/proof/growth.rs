@@ -1,4 +1,4 @@
-//! Growth of modes: whether a motion stays bounded, asked before the first step, and told with the resolution of the answer.
+//! Growth of modes: boundedness of a motion, examined before the first step, and reported with the resolution of the answer.
 
 #![deny(clippy::wildcard_enum_match_arm)]
 
@@ -22,7 +22,7 @@ use crate::system::{Ranks, SemiDiscrete, Symmetry};
 /// The largest factor by which a mode that is not seen may grow over the run, if the answer is to be that none grows.
 const UNSEEN: f64 = 1.1;
 
-/// Growth by less than `exp` of this over a run is told as none: what rounding makes of double eigenvalues.
+/// Growth by less than `exp` of this over a run is reported as none: rounding makes as much of double eigenvalues.
 const LEAST: f64 = 1e-3;
 
 /// The growth exponent from which on a growing mode is warned of: it gains 1 % of energy.
@@ -34,16 +34,16 @@ const GAINED: f64 = 0.01;
 /// The same, from which on a run is refused: the watch on its energy would stop it.
 const STOPPED: f64 = 0.1;
 
-/// What is known before a run of a motion that may grow.
+/// Data for the search for growing modes before a run.
 #[derive(Clone, Copy)]
 pub struct GrowthQuestion<'a> {
-    /// What to do about it.
+    /// Remedy for growing modes.
     pub remedy: &'static str,
-    /// What shows that no mode grows, if anything does.
+    /// Evidence that no mode grows, if there is any.
     pub proved: Option<&'static str>,
-    /// What becomes of a run in which one does.
+    /// Policy for a run in which one does.
     pub policy: GrowingModesSpec,
-    /// Where a site is.
+    /// Position of a site.
     pub place: &'a dyn Fn(usize) -> Vec<f64>,
     /// The processes that ask together.
     pub ranks: Option<&'a dyn Ranks>,
@@ -77,7 +77,7 @@ pub(crate) fn free_start<'a, const D: usize>(
     Ok(is_zero.then_some((&begin.u[..], &begin.v[..])))
 }
 
-/// What to do about modes that grow with a coupling.
+/// Returns the remedy for modes that grow with a coupling.
 // a text, which serves couplings to come as well
 #[allow(clippy::wildcard_enum_match_arm)]
 pub(crate) fn remedy(coupling: &CouplingSpec) -> &'static str {
@@ -87,7 +87,7 @@ pub(crate) fn remedy(coupling: &CouplingSpec) -> &'static str {
     }
 }
 
-/// What shows that no mode grows at rest: a symmetric stiffness whose energy is a sum of squares, or that has been factorised.
+/// Returns the evidence, if any, that no mode grows at rest: a symmetric stiffness whose energy is a sum of squares, or that has been factorised.
 ///
 /// Collective, of processes. The energy of bonds is a sum of squares if no weight is negative, that of a state-based law below the Poisson ratio of its bonds too: its squares are those of volume and shape.
 pub(crate) fn proved<const D: usize>(
@@ -119,13 +119,13 @@ pub(crate) fn proved<const D: usize>(
     no_weight_is_negative.then_some("the stiffness is symmetric, and its energy a sum of squares")
 }
 
-/// What a factorisation shows.
+/// Evidence by a factorisation.
 const FACTORISED: &str = "a Cholesky factorisation of the stiffness shows no negative eigenvalue";
 
-/// The dearest factorisation that is made only to prove that no mode grows: some seconds of one core.
+/// Operations of the costliest factorisation that is made only to prove that no mode grows: some seconds of one core.
 const MOST_FLOPS: f64 = 1e10;
 
-/// The line of the proof: whether a mode grows, and what shows it.
+/// The line of the proof: growth of a mode or none, and the evidence.
 fn line_of(found: &Growth, exponent: f64, unseen: f64, place: &[f64]) -> String {
     let how = evidence(found);
     let hidden = format!(
@@ -166,7 +166,7 @@ fn gained(
 /// Collective: looks for modes that grow over a run of `steps` steps of `step`; at most a tenth of its products, and at least 200.
 ///
 /// # Errors
-/// [`RunError::Grows`] for a mode that doubles the energy, unless the scene wants to be told only.
+/// [`RunError::Grows`] for a mode that doubles its energy over the run, or for growing modes that end with more than [`STOPPED`] of the energy of a free motion, unless the scene wants a warning only.
 pub(crate) fn check(
     asked: &GrowthQuestion<'_>,
     system: &dyn SemiDiscrete,
@@ -244,7 +244,7 @@ pub(crate) fn check(
     })
 }
 
-/// What the part is called.
+/// Name of the part.
 const NAME: &str = "growth";
 
 fn coordinates(place: &[f64]) -> String {

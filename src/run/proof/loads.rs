@@ -27,10 +27,10 @@ const EXACT: f64 = 1e-9;
 /// Difference at which a run is refused: beyond what a mesh resolves anyway.
 const LOST: f64 = 1e-2;
 
-/// Distance of the layer of points that is held from the face that is held, in spacings, from which on it is told: beyond what half a cell does.
+/// Distance of the layer of points that is held from the face that is held, in spacings, from which on it is warned of: beyond the effect of half a cell.
 const FAR: f64 = 0.75;
 
-/// Compares what the model carries with what the mesh holds.
+/// Compares masses and loads of the model with integrals over the mesh.
 ///
 /// # Errors
 /// As [`loads`](crate::run::loads::loads).
@@ -91,7 +91,7 @@ pub(super) fn centre<const D: usize>(model: &Model<D>) -> Vector<D> {
     (low + high) * 0.5
 }
 
-/// A condition as it is at time zero; components that depend on time alone are one, for the force of a unit field is what loads are made of.
+/// A condition as it is at time zero; components that depend on time alone are one, for loads are made of the force of a unit field.
 fn steady<const D: usize>(condition: &Condition<D>) -> Condition<D> {
     let in_space = condition.components.depends_on_position();
     let mut steady = condition.clone();
@@ -102,7 +102,7 @@ fn steady<const D: usize>(condition: &Condition<D>) -> Condition<D> {
     steady
 }
 
-/// An integral with the sum of the sizes of what was summed, and what two rules differ by.
+/// An integral with that of the norm of its integrand, and the difference of two quadrature rules.
 struct Exact<const D: usize> {
     moments: Moments<D>,
     /// `∫ |b|`.
@@ -162,7 +162,7 @@ fn exact<const D: usize>(
     found
 }
 
-/// What the middles of cells or facets alone make of the integral of a field that varies, as a difference from `fine`: rules of other points differ by less.
+/// Returns the difference from `fine` of the integral of a field that varies, by the middles of cells or facets alone: other quadrature rules differ by less.
 fn coarser<const D: usize>(
     model: &Model<D>,
     on: &Domain<D>,
@@ -401,7 +401,7 @@ fn unbalanced<const D: usize>(model: &Model<D>, condition: &Condition<D>) -> Opt
     })
 }
 
-/// Looks at every support on a set where it bounds the peridynamic zone; returns what to say of them.
+/// Looks at every support on a set where it bounds the peridynamic zone; returns a phrase about them for the line of the proof.
 fn supports<const D: usize>(
     model: &Model<D>,
     conditions: &[Condition<D>],

@@ -1,13 +1,13 @@
-//! Proof of a model before it is solved: what must hold whatever the load is checked on the model at hand, and told, warned of, or refused.
+//! Proof of a model before it is solved: properties that must hold whatever the load are checked on the model at hand, and reported, warned of, or refused.
 //!
 //! | file | what is shown |
 //! |---|---|
 //! | `loads.rs` | mass, total and first moment of each load against integrals over the mesh; supports held everywhere |
 //! | `affine.rs` | the force of every affine field, row by row, against that of its constant stress |
-//! | `classes.rs`, `fields.rs`, `surface.rs`, `patch.rs` | rows out of balance and what is told of them, the fields and their forces, the boundary of the body, the error of the stress around a row out of balance |
-//! | `symmetry.rs` | whether a stiffness that the coupling promises to be symmetric is |
+//! | `classes.rs`, `fields.rs`, `surface.rs`, `patch.rs` | rows out of balance and the findings on them, the fields and their forces, the boundary of the body, the error of the stress around a row out of balance |
+//! | `symmetry.rs` | symmetry of the stiffness where the coupling promises it |
 //! | `quadratic.rs` | the force of quadratic fields beside the seam |
-//! | `growth.rs` | whether a mode of the motion grows |
+//! | `growth.rs` | growth of modes of the motion |
 //!
 //! A check is one file with one function and one line in [`prove`]. What it returns is plain data ([`Part`]), so the summary, `check` and `--json` know of it without another line.
 //! Limits stand in `docs/proof.md`, each beside the measurement that chose it.
@@ -33,7 +33,7 @@ use crate::system::{BlockCsr, Ranks, SemiDiscrete};
 
 pub use self::affine::displacements as affine_displacements;
 
-/// What is to be proved: a model laid out, with its conditions.
+/// Subject of the proof: a model laid out, with its conditions.
 pub struct Subject<'a, const D: usize> {
     /// Sites, families and zones.
     pub model: &'a Model<D>,
@@ -41,13 +41,13 @@ pub struct Subject<'a, const D: usize> {
     pub coupling: &'a dyn Coupling<D>,
     /// Rows of the stiffness.
     pub operator: &'a dyn Operator<D>,
-    /// What the run keeps of the scene.
+    /// Settings that the run keeps of the scene.
     pub rest: &'a RunSettings<D>,
     /// The assembled stiffness, where the run has one; else rows come from the operator.
     pub stiffness: Option<&'a BlockCsr>,
     /// The products with the stiffness, where its rows are spread over processes.
     pub product: Option<&'a dyn LinearMap>,
-    /// What moves, in a scene that does; its tangent at rest has the rows.
+    /// The dynamic system, in a scene that has one; its tangent at rest has the rows.
     pub system: Option<&'a dyn SemiDiscrete>,
     /// Forces of the fields of [`affine_displacements`], where they are known already.
     pub affine_forces: &'a [Vec<f64>],
@@ -79,7 +79,7 @@ pub fn prove<const D: usize>(
     Ok(proof)
 }
 
-/// Refuses what a proof does not hold for.
+/// Refuses a model for which the proof does not hold.
 ///
 /// # Errors
 /// [`RunError::Unproven`] with the first refusal.

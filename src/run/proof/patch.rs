@@ -15,16 +15,16 @@ use crate::{assembly::Row, parallel};
 /// Most sites of a patch: in the plane some four horizons around its middle at m = 3, in space one and a half. With 300 in the plane the patch of a splice on scattered points came near to a singular one.
 const SITES: [usize; 3] = [200, 500, 250];
 
-/// What a patch is cut from.
+/// Model and boundary from which patches are cut.
 pub(super) struct Around<'a, const D: usize> {
     pub model: &'a Model<D>,
     pub operator: &'a dyn Operator<D>,
     /// The assembled stiffness, where the run has one.
     pub stiffness: Option<&'a BlockCsr>,
     pub boundary: &'a Boundary<'a, D>,
-    /// Which dofs are prescribed.
+    /// True for each dof that is prescribed.
     pub held: &'a [bool],
-    /// How far families reach into each other at a site: sites nearer than this to a boundary lack bonds.
+    /// Reach of the families that enter the row of a site: sites nearer than this to a boundary lack bonds.
     pub reach: f64,
     /// The point that all fields leave in place.
     pub centre: Vector<D>,
@@ -37,11 +37,11 @@ pub(super) struct Around<'a, const D: usize> {
 pub(super) struct StressError<const D: usize> {
     /// Difference of a stress component from that of the field, over the largest component of the field; signed where it is that component.
     pub relative: f64,
-    /// Where.
+    /// Position of that error.
     pub at: Vector<D>,
 }
 
-/// A field of a patch: its gradient, and by how much the displacement of a held dof differs from it.
+/// A field of a patch: its gradient, and the difference of the displacement of a held dof from it.
 pub(super) struct PatchField<'a, const D: usize> {
     pub gradient: Tensor<D>,
     /// Nodal forces of the field's stress on element boundaries, `D` numbers per site; none if they are zero.
@@ -125,7 +125,7 @@ pub(super) fn stress_errors<const D: usize>(
     Some(errors.collect())
 }
 
-/// Whether a site of a patch keeps the field whatever its row asks for.
+/// Returns true if a site of a patch keeps the field whatever its row asks for.
 fn keeps_field<const D: usize>(
     around: &Around<'_, D>,
     site: u32,
@@ -157,7 +157,7 @@ struct Rows {
 }
 
 impl<const D: usize> Around<'_, D> {
-    /// What the held dofs of a site have beyond the field.
+    /// Returns the excess of the held dofs of a site over the field.
     fn mismatch(&self, field: &PatchField<'_, D>, site: u32) -> Vector<D> {
         Vector::from_fn(|a, _| {
             let dof = site as usize * D + a;

@@ -63,7 +63,7 @@ impl Density {
     }
 }
 
-/// What is told of an error that is too large.
+/// Returns the finding for an error that is too large.
 fn finding(predicted: f64, place: Vec<f64>) -> Finding {
     let (severity, limit) = match predicted > REFUSED {
         true => (Severity::Refusal, REFUSED),
@@ -192,7 +192,7 @@ fn density<const D: usize>(tensor: &Tensor4<D>, b: usize, d: usize) -> Tensor<D>
     })
 }
 
-/// Whether no bond is missing from a family, as far as symmetry tells.
+/// Returns true if no bond is missing from a family, as far as symmetry shows.
 fn is_whole<const D: usize>(body: &PdBody<D>, i: usize) -> bool {
     let (mut sum, mut size) = (Vector::<D>::zeros(), 0.0);
     for &j in body.families.of(i) {
@@ -203,7 +203,7 @@ fn is_whole<const D: usize>(body: &PdBody<D>, i: usize) -> bool {
     size > 0.0 && sum.norm() <= WHOLE * size
 }
 
-/// Whether all points of a family have one material, where points may have several.
+/// Returns true if a point and its family have the material `own`, where points may have several.
 fn is_of_material<const D: usize>(body: &PdBody<D>, i: usize, own: u16) -> bool {
     let material = &body.cloud.material;
     let mut family = body.families.of(i).iter();
@@ -243,7 +243,7 @@ fn seam_sites<const D: usize>(
     seam
 }
 
-/// What the row of a site makes of each quadratic field about it: entry (a, c) is the force along a of `u_c`.
+/// Applies the row of a site to each quadratic field about it: entry (a, c) is the force along a of `u_c`.
 fn second_moments<const D: usize>(
     subject: &Subject<'_, D>,
     site: usize,
@@ -289,10 +289,10 @@ fn zone_size<const D: usize>(subject: &Subject<'_, D>) -> f64 {
 /// Size of elements that carry the partial stress over the spacing of points from which on their strains stay smooth wherever the lattice lies.
 ///
 /// Tip of a cantilever over the exact one (1/32 = h, m = 3), lattice off the nodes by 0, 0.1, 0.25, 0.3, 0.4 and 0.5 h: 1.000, 1.000, −0.06, 0.39, 1.28, 1.000 with elements of h; 1.000 with those of 2 h and 0.999 with those of 3 h.
-/// The short-wave stiffness of such elements is near zero, and the unlike families of the Gauss points take it below; where it does so no affine or quadratic field tells.
+/// The short-wave stiffness of such elements is near zero, and the unlike families of the Gauss points take it below; no affine or quadratic field shows the places where it does so.
 const SMOOTH: f64 = 1.5;
 
-/// What refuses elements that carry the partial stress of points between their nodes and are as small as the spacing.
+/// Refuses or warns of elements that carry the partial stress of points between their nodes and are as small as the spacing.
 fn small_stress_elements<const D: usize>(subject: &Subject<'_, D>) -> Option<Finding> {
     let model = subject.model;
     if !model.has_places_between_nodes() {

@@ -1,4 +1,4 @@
-//! Free surfaces, supports, cracks and voids: how far a place lies from them, and what becomes of a facet there.
+//! Free surfaces, supports, cracks and voids: the distance of a place from them, and the kind of a facet there.
 
 #![deny(clippy::wildcard_enum_match_arm)]
 
@@ -16,10 +16,10 @@ use crate::tensor::{Tensor, Vector};
 /// The cosine of the angle between the normals of two facets above which they lie in one plane.
 pub(super) const PLANE: f64 = 0.99;
 
-/// And above which one surface goes on from the one to the other without an edge: a circle of six facets is still one.
+/// The cosine above which a surface goes on from one facet to the other without an edge: a circle of six facets is still one.
 const SMOOTH: f64 = 0.49;
 
-/// What the conditions of a scene make of a facet of the outer boundary.
+/// Kind of a facet of the outer boundary, by the conditions of the scene on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) enum FacetKind {
     /// No condition is on it.
@@ -30,7 +30,7 @@ pub(super) enum FacetKind {
     Loaded,
 }
 
-/// Whether a layer of elements could cover the points at the surface of a body.
+/// Determines if a layer of elements could cover the points at the surface of a body.
 pub(super) fn skin<const D: usize>(model: &Model<D>) -> Skin {
     let mesh = &model.mesh;
     let cells = 0..mesh.cell_count();
@@ -148,7 +148,7 @@ impl<'a, const D: usize> Boundary<'a, D> {
         })
     }
 
-    /// Whether bonds of another material come nearer to `x` than `limit`: points stand for their material up to half a spacing beyond its border.
+    /// Returns true if bonds of another material come nearer to `x` than `limit`: points stand for their material up to half a spacing beyond its border.
     pub fn is_near_border(&self, x: &Vector<D>, limit: f64) -> bool {
         let limit = limit + self.model.spacing();
         self.borders.iter().any(|(low, high)| {
@@ -183,7 +183,7 @@ impl<'a, const D: usize> Boundary<'a, D> {
         is_found
     }
 
-    /// The parts of a smooth surface that are the points', but for what lies in the plane of its facet `main`.
+    /// The parts of a smooth surface that are the points', but for those in the plane of its facet `main`.
     pub fn bent_parts(&self, main: usize, surface: &[bool]) -> Parts<D> {
         let n = &self.normals[main];
         let is_bent = |f: usize| surface[f] && self.normals[f].dot(n) <= PLANE;
@@ -197,7 +197,7 @@ impl<'a, const D: usize> Boundary<'a, D> {
         )
     }
 
-    /// Whether a crack or a void is nearer to `x` than `limit`.
+    /// Returns true if a crack or a void is nearer to `x` than `limit`.
     pub fn is_near_crack(&self, x: &Vector<D>, limit: f64) -> bool {
         self.barriers.near(x, limit)
     }
@@ -240,7 +240,7 @@ fn borders<const D: usize>(
     boxes
 }
 
-/// What the conditions make of each facet.
+/// Returns the kind of each facet, by the conditions on it.
 fn kinds<const D: usize>(
     model: &Model<D>,
     conditions: &[Condition<D>],

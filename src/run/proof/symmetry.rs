@@ -1,4 +1,4 @@
-//! Whether the stiffness is symmetric where the coupling promises it: a horizon that varies breaks the promise.
+//! Symmetry of the stiffness where the coupling promises it: a horizon that varies breaks the promise.
 
 use super::Subject;
 use crate::observe::proof::{Figure, Finding, Part, Severity};
@@ -9,7 +9,7 @@ use crate::system::Symmetry;
 /// Relative asymmetry that round-off leaves.
 const ROUND_OFF: f64 = 1e-12;
 
-/// Compares `xᵀ K y` with `yᵀ K x` for two vectors without order.
+/// Compares `xᵀ K y` with `yᵀ K x` for two pseudo-random vectors.
 ///
 /// None without a promise, and without a matrix or a tangent to multiply by: `check` of a static scene measures the pattern instead.
 pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Option<Part> {

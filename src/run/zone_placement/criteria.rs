@@ -1,4 +1,4 @@
-//! What a displacement needs: a nonlocal law where it varies within a horizon, bonds where they are about to break.
+//! Cells that a displacement marks: it needs a nonlocal law where it varies within a horizon, and bonds where they are about to break.
 
 use super::shapes::touching;
 use crate::coupling::error_indicator::{Criteria, Need, gradient_ratio};
@@ -10,7 +10,7 @@ use crate::scene::materials::{Fracture, Material};
 use crate::scene::region;
 use crate::tensor::{Tensor4, Vector};
 
-/// What is asked of the cells.
+/// Input to the criteria for cells.
 pub(super) struct CriterionInput<'a> {
     /// The material that the points will have.
     pub material: u16,
@@ -22,7 +22,7 @@ pub(super) struct CriterionInput<'a> {
     pub stretch: f64,
 }
 
-/// Where the displacement needs bonds.
+/// Finds the cells in which the displacement needs bonds.
 pub(super) fn need<const D: usize>(
     scene: &Draft<'_, D>,
     asked: &CriterionInput<'_>,
@@ -78,7 +78,7 @@ fn micromodulus<const D: usize>(material: &Material<D>, r: f64, horizon: f64) ->
     material.law.linearised().kernel(r, horizon)
 }
 
-/// The stretch at which bonds of a material break. A fracture energy that gives none is the run's to complain of.
+/// The stretch at which bonds of a material break. A fracture energy that gives none is left to the run to refuse.
 fn critical_stretch<const D: usize>(material: &Material<D>, horizon: f64) -> Option<f64> {
     match material.fracture? {
         Fracture::Stretch(s) => Some(s),

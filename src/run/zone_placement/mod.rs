@@ -1,6 +1,6 @@
 //! `zones = "auto"`: the nonlocal zone that follows from a scene's shapes, and from its displacement in elements.
 //!
-//! 1. Cells at cracks, at voids and at notches are marked, the last for good only where bonds break. What is marked is padded, gaps narrower than a horizon are closed, islands of elements smaller than a family are filled.
+//! 1. Cells at cracks, at voids and at notches are marked, the last for good only where bonds break. Marked cells are padded, gaps narrower than a horizon are closed, islands of elements smaller than a family are filled.
 //! 2. A static scene is solved with that zone, with elements alone where it is empty. Elements in which [`Criteria`](crate::coupling::error_indicator::Criteria) finds the local model wrong or a bond near its end are marked too.
 //! 3. Where they lie outside, the zone is theirs and the scene is solved again; one around notches only where it leaves clearly more of the error than the tolerance, or is much larger than theirs. Else the solution is that of the scene, and is kept: the run writes it without solving again. A look costs its search only.
 //!
@@ -10,7 +10,7 @@
 //! |---|---|
 //! | `shapes.rs` | cells at cracks, voids and notches |
 //! | `solutions.rs` | the displacement by elements alone, or with a zone so far |
-//! | `criteria.rs` | what that displacement needs |
+//! | `criteria.rs` | cells in which that displacement needs a nonlocal law or bonds |
 
 mod criteria;
 mod shapes;
@@ -74,7 +74,7 @@ fn refuse_second_order<const D: usize>(mesh: &Mesh<D>, span: &Span) -> Result<()
 /// The zone of a scene that asks for one; none if it draws its own, or needs none.
 ///
 /// # Errors
-/// What the scene lacks, and what its solutions complain of.
+/// [`SceneError`] for a scene that lacks something, and for a solution that fails.
 pub(crate) fn placed<const D: usize>(scene: &Draft<'_, D>) -> Result<Option<Found<D>>, SceneError> {
     let (spec, mesh) = (scene.spec, &scene.mesh);
     let Some(auto) = &spec.zones.auto else {
@@ -149,11 +149,11 @@ struct Search<'a, const D: usize> {
     /// At the centre of each cell.
     horizon: Vec<f64>,
     marked: Marked,
-    /// What of `marked` is padded as shapes are.
+    /// Cells of `marked` that are padded as shapes are.
     shapes: Vec<bool>,
     /// The material of the points.
     material: u16,
-    /// Where the scene asks.
+    /// Position of `zones.auto` in the scene.
     span: Span,
     start: Instant,
 }
@@ -171,7 +171,7 @@ const SETTLED: f64 = 1.2;
 const SPARE: usize = 2;
 
 impl<const D: usize> Search<'_, D> {
-    /// Whether there is a zone to begin with.
+    /// Returns true if there is a zone to begin with.
     fn begins(&self) -> bool {
         self.shapes.contains(&true) || self.marked.notches.contains(&true)
     }
@@ -274,7 +274,7 @@ impl<const D: usize> Search<'_, D> {
         }
     }
 
-    /// The zone around what is marked.
+    /// The zone around shapes and the cells that the criteria mark.
     fn zone(&self, criteria: &[bool]) -> Vec<bool> {
         zone(
             self.scene,
@@ -310,7 +310,7 @@ fn alone(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
     .help("keep one of them; `--set zones=auto` replaces all of [zones]"))
 }
 
-/// Refuses bonds that are damaged, or break, by something else than their stretch: where that begins no solution before the run shows.
+/// Refuses bonds that are damaged, or break, by something else than their stretch: no solution before the run shows the place where that begins.
 fn refuse_damage<const D: usize>(material: &Material<D>, span: &Span) -> Result<(), SceneError> {
     let does = match material.fracture {
         _ if material.law.damages() => "takes their stiffness by a damage before they break",
@@ -428,7 +428,7 @@ fn zone<const D: usize>(
     within(mesh.filled(&closed, (2.0 * largest).powi(D as i32)))
 }
 
-/// What was chosen, and why.
+/// Returns the choice, and the reasons for it.
 fn told<const D: usize>(
     scene: &Draft<'_, D>,
     options: &Options,

@@ -1,20 +1,20 @@
-//! Cells at what the scene cuts out of the body, and at the mesh's own notches.
+//! Cells at the cracks and voids that the scene cuts out of the body, and at the mesh's own notches.
 
 use crate::mesh::Mesh;
 use crate::scene::draft::Draft;
 use crate::scene::error::SceneError;
 use crate::scene::region;
 
-/// How far from a crack, in sizes of a cell, centroids of cut cells lie: below half a diagonal a path of cut cells would have gaps.
+/// Distance from a crack, in sizes of a cell, within which centroids of cut cells lie: below half a diagonal a path of cut cells would have gaps.
 const CUT_WITHIN: f64 = 0.71;
 
-/// What marks cells, beside their padding.
+/// Cells at cracks, voids and notches, without their padding.
 pub(super) struct Marked {
     pub cracks: Vec<bool>,
     pub voids: Vec<bool>,
     /// At notches of the mesh.
     pub notches: Vec<bool>,
-    /// Whether bonds break, so that notches are nonlocal whatever the displacement.
+    /// True if bonds break, so that notches are nonlocal whatever the displacement.
     pub breaks: bool,
     /// Cells that carry next to nothing in the finite-element solution.
     pub cut: Vec<bool>,

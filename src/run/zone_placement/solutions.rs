@@ -41,7 +41,7 @@ impl<const D: usize> CachedSolution<D> {
         u
     }
 
-    /// The same, with what points around give at the nodes of cells that hold points.
+    /// The same, with the displacement of the points around at the nodes of cells that hold points.
     pub(super) fn everywhere(&self) -> Vec<Vector<D>> {
         let sampler = Sampler::new(&self.model);
         let displacement = &self.equilibrium.solution.displacement;
@@ -88,7 +88,7 @@ pub(super) fn state<const D: usize>(
 /// The solution of a static scene with the zone that it has so far.
 ///
 /// # Errors
-/// What the solution complains of.
+/// [`SceneError`] for a solution that fails.
 pub(super) fn coupled<const D: usize>(
     scene: Scene<D>,
     span: &Span,
@@ -126,7 +126,7 @@ fn initial<const D: usize>(scene: &Draft<'_, D>) -> Vec<Vector<D>> {
     u
 }
 
-/// Solves the scene with elements alone, under what holds and loads it at time `t`.
+/// Solves the scene with elements alone, under its supports and loads at time `t`.
 fn elements<const D: usize>(
     scene: &Draft<'_, D>,
     cut: &[bool],
@@ -154,7 +154,7 @@ fn elements<const D: usize>(
 
 /// The largest difference of the displacement of a static scene from that of elements alone, at nodes of elements, over the largest of that.
 ///
-/// Where no crack or void is, that is what a coupling errs by, and what the nonlocal law adds. None where there are such, where forces are not linear in the displacement, or without a solution.
+/// Without cracks and voids that is the error of a coupling, together with the effect of the nonlocal law. None with cracks or voids, where forces are not linear in the displacement, or without a solution.
 pub(crate) fn difference_from_elements<const D: usize>(
     model: &Model<D>,
     rest: &setup::RunSettings<D>,
@@ -200,7 +200,7 @@ pub(crate) fn difference_from_elements<const D: usize>(
     part.is_finite().then_some(part)
 }
 
-/// Lays out and solves a problem under what holds and loads it at time `t`.
+/// Lays out and solves a problem under its supports and loads at time `t`.
 fn solved<const D: usize>(
     problem: Problem<D>,
     conditions: &[Condition<D>],

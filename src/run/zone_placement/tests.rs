@@ -218,7 +218,7 @@ fn a_corner_is_marked_until_the_rest_is_within_the_tolerance() {
     }
 }
 
-/// What elements miss of a field grows with the length over which bonds weigh it: the micromodulus of the scene's law decides, no other.
+/// The error of elements in a field grows with the length over which bonds weigh it: the micromodulus of the scene's law decides, no other.
 #[test]
 fn bonds_that_weigh_their_far_ends_more_show_a_larger_error() {
     let error = |micromodulus: &str| -> f64 {

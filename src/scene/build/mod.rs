@@ -1,10 +1,10 @@
-//! Scenes from a program: what a scene file says, said in Rust.
+//! Scenes made by a program: the content of a scene file, in Rust.
 //!
 //! A [`SceneBuilder`] collects the keys of a scene (`docs/scene.md` has them all) and makes a [`Source`] of them. The same types read it that read a file, and the same
 //! checks follow, so every key and every message of a scene file is one of the builder too; messages name keys as places. Common keys have methods, [`SceneBuilder::set`] sets any other.
 //! Numbers that may vary are [`Value`]s: numbers, expressions as text, or [`Function`]s.
 //!
-//! | file | what |
+//! | file | content |
 //! |---|---|
 //! | `value.rs` | values and tables of them |
 //! | `parts.rs` | materials, regions, conditions, fields at time zero, impactors |
@@ -128,12 +128,12 @@ impl SceneBuilder {
         self.set("peridynamics.points.lattice.spacing", spacing)
     }
 
-    /// Where the body is peridynamic; elsewhere it is of finite elements.
+    /// Sets the nonlocal zone, in which the body is peridynamic; elsewhere it is of finite elements.
     pub fn nonlocal(self, region: Region) -> Self {
         self.set("zones.nonlocal", region.entries)
     }
 
-    /// Where both models overlap.
+    /// Sets the transition zone, in which both models overlap.
     pub fn transition(self, region: Region) -> Self {
         self.set("zones.transition", region.entries)
     }
@@ -143,7 +143,7 @@ impl SceneBuilder {
         self.set("zones", "auto")
     }
 
-    /// How the models are coupled, by name: `"splice"`, `"truncated"`, … Options of a coupling are keys, `.set("coupling.blending.beta", "smooth")`.
+    /// Sets the coupling of the models by name: `"splice"`, `"truncated"`, … Options of a coupling are keys, `.set("coupling.blending.beta", "smooth")`.
     pub fn coupling(self, name: &str) -> Self {
         self.set("coupling", name)
     }
@@ -196,7 +196,7 @@ impl SceneBuilder {
         self.set("solve.quasi-static.steps", steps)
     }
 
-    /// A point at which the solution is told: the table `probes`, or columns of the history.
+    /// Adds a point at which the solution is written: the table `probes`, or columns of the history.
     pub fn probe(mut self, name: &str, at: impl Into<Value>) -> Self {
         let mut probe = Entries::default();
         probe.set("at", at);
@@ -204,7 +204,7 @@ impl SceneBuilder {
         self
     }
 
-    /// What the scene is called.
+    /// Returns the name of the scene.
     pub fn name(&self) -> &str {
         &self.name
     }

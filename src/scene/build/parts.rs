@@ -82,7 +82,7 @@ impl Material {
     }
 }
 
-/// What a condition acts on.
+/// Sets the place on which a condition acts.
 fn place(part: Condition, region: Region) -> Condition {
     match region.set_name {
         Some(name) => part.set("on", name),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::scene::function::Function;
 
-/// What a key of a scene is set to.
+/// Value of a key of a scene.
 #[derive(Clone, Debug)]
 pub enum Value {
     /// A number, a text or a list. A text that stands for a number is an expression in `x`, `y`, `z` and `t`.

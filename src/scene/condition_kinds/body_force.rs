@@ -20,7 +20,7 @@ use crate::scene::value::Text;
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct BodyForceSpec {
-    /// Where; everywhere if left out.
+    /// Region of the force; everywhere if left out.
     #[serde(default)]
     pub inside: Option<ShapeSpec>,
     /// Force along x.

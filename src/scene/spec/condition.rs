@@ -24,7 +24,7 @@ pub struct TemperatureSpec {
 pub struct VoidSpec {
     /// Its shape.
     pub inside: ShapeSpec,
-    /// Whether bonds across it are cut. Left uncut, an opening comes out several times too small.
+    /// True if bonds across it are cut; true if left out. Left uncut, an opening comes out several times too small.
     #[serde(default = "yes")]
     pub cut_bonds: bool,
 }

@@ -16,7 +16,7 @@ use crate::solve::statics::Method;
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct SolverSpec {
-    /// Which solver.
+    /// Method of solution.
     #[serde(default)]
     pub method: Method,
     /// Relative residual at which the iteration stops; 1e-10 if left out.
@@ -28,12 +28,12 @@ pub struct SolverSpec {
     /// Elimination order of the direct solver.
     #[serde(default)]
     pub ordering: Ordering,
-    /// What becomes of a model whose proof refuses it: affine or quadratic fields come out wrong, or loads do not add up.
+    /// Treatment of a model that fails its proof: affine or quadratic fields come out wrong, or loads do not add up.
     #[serde(default)]
     pub unproven: UnprovenSpec,
 }
 
-/// What becomes of a model whose proof refuses it.
+/// Treatment of a model that fails its proof.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum UnprovenSpec {
@@ -44,7 +44,7 @@ pub enum UnprovenSpec {
     Warn,
 }
 
-/// What is written, and where.
+/// Output files: folder, names and content.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct OutputSpec {
@@ -54,13 +54,13 @@ pub struct OutputSpec {
     /// Beginning of all file names; the scene's file name if left out.
     #[serde(default)]
     pub name: Option<Text>,
-    /// Whether a VTU file is written; true if left out.
+    /// True if a VTU file is written; true if left out.
     #[serde(default)]
     pub vtu: Option<bool>,
-    /// How the VTU shows peridynamic points; "vertices" if left out.
+    /// Representation of peridynamic points in the VTU; "vertices" if left out.
     #[serde(default)]
     pub points: PointOutputSpec,
-    /// Whether the VTU has the energy density of peridynamic points; false if left out.
+    /// True if the VTU has the energy density of peridynamic points; false if left out.
     #[serde(default)]
     pub energy_density: Option<bool>,
     /// Stresses that the VTU holds as fields beside the tensor; with any of them tables of static scenes along lines and at probes, and histories for probes, have columns of stress. None if left out.
@@ -84,7 +84,7 @@ pub struct OutputSpec {
     pub tips: BTreeMap<Text, TipSpec>,
 }
 
-/// How a VTU file shows peridynamic points.
+/// Representation of peridynamic points in a VTU file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum PointOutputSpec {
@@ -144,7 +144,7 @@ pub struct ProbeSpec {
 pub struct SectionSpec {
     /// A point of the plane.
     pub point: Coordinates,
-    /// Normal of the plane, of any length; it points to the part whose force on the rest is told.
+    /// Normal of the plane, of any length; it points to the part whose force on the rest is reported.
     pub normal: Coordinates,
     /// A shape that holds that part beyond the plane; all beyond the plane if left out.
     #[serde(default)]

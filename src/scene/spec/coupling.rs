@@ -15,7 +15,7 @@ use crate::coupling::{
 };
 use crate::peridynamics::{Influence, LinearForceState};
 
-/// How finite elements and peridynamics are joined.
+/// Coupling of finite elements and peridynamics.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CouplingSpec {
@@ -35,7 +35,7 @@ pub enum CouplingSpec {
     Nonlocal(NoOptionsSpec),
 }
 
-/// What a coupling asks of the zones of a scene.
+/// Zones that a coupling needs in a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ZonesNeeded {
     /// None: every cell is of this zone.
@@ -46,12 +46,12 @@ pub enum ZonesNeeded {
     Transition {
         /// The least width over the largest horizon.
         width: f64,
-        /// What that width gives.
+        /// Benefit of that width.
         why: &'static str,
     },
 }
 
-/// Where a lattice lies whose origin is not typed, relative to the mesh's lowest corner.
+/// Position of a lattice whose origin is not typed, relative to the mesh's lowest corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LatticeStart {
     /// A point lies on the corner: on a mesh of the same spacing points coincide with nodes, and a seam interpolates nothing.
@@ -60,16 +60,16 @@ pub enum LatticeStart {
     Halfway,
 }
 
-/// What is told of a coupling: its name, a line about it, and what it needs.
+/// Traits of a coupling: its name, a description in one line, and its needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CouplingTraits {
     /// The name, as a scene spells it.
     pub name: &'static str,
-    /// What the method does, in one line.
+    /// Description of the method, in one line.
     pub about: &'static str,
     /// The zones that it needs.
     pub zones: ZonesNeeded,
-    /// Where a lattice lies whose origin is not typed.
+    /// Position of a lattice whose origin is not typed.
     pub lattice: LatticeStart,
 }
 
@@ -257,12 +257,12 @@ impl BetaSpec {
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct TruncatedSpec {
-    /// What becomes of cut bonds where bonds are exact or break; `breaking` if left out, `linear` beside a zone that follows its crack.
+    /// Treatment of cut bonds where bonds are exact or break; `breaking` if left out, `linear` beside a zone that follows its crack.
     #[serde(default)]
     pub cut_bonds: Option<CutBondsSpec>,
 }
 
-/// What becomes of bonds that the seam cuts.
+/// Treatment of bonds that the seam cuts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CutBondsSpec {
@@ -277,7 +277,7 @@ pub enum CutBondsSpec {
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct PartialStressSpec {
-    /// How the divergence of the partial stress is taken.
+    /// Discretisation of the divergence of the partial stress.
     #[serde(default)]
     pub form: FormSpec,
     /// Order of the least-squares constraint where mesh and points meet.
@@ -285,7 +285,7 @@ pub struct PartialStressSpec {
     pub interface: InterfaceSpec,
 }
 
-/// How the divergence of the partial stress is taken.
+/// Discretisation of the divergence of the partial stress.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FormSpec {

@@ -158,7 +158,7 @@ impl JsonSchema for MaterialSpec {
 }
 
 impl MaterialSpec {
-    /// What breaks bonds of a material whose bonds can break; the bonds of all others are known to first order only.
+    /// Returns the fracture criteria of a material whose bonds can break; the bonds of all others are known to first order only.
     pub fn fracture(&self) -> Option<FractureSpec<'_>> {
         let (law, energy, stretch, tearing) = match self {
             Self::BondBased(m) => ("bond-based", &m.fracture_energy, &m.critical_stretch, None),
@@ -183,15 +183,15 @@ impl MaterialSpec {
     }
 }
 
-/// What a material says of breaking bonds.
+/// Fracture criteria of a material, as typed.
 pub struct FractureSpec<'a> {
     /// The key of the material's law.
     pub law: &'static str,
-    /// Keys, and what is typed.
+    /// Keys, and the number that is typed.
     pub typed: [(FractureKey, Option<&'a Number>); 3],
 }
 
-/// A key that says when bonds of a material break.
+/// Key of a fracture criterion of a material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FractureKey {
     /// By the energy per area of a new crack.
@@ -225,7 +225,7 @@ pub struct BondBasedSpec {
     /// Linear thermal expansion α per degree, with `[temperature]`.
     #[serde(default)]
     pub thermal_expansion: Option<Number>,
-    /// How the stiffness of a bond depends on its length.
+    /// Dependence of the bond stiffness on the bond length; "inverse-distance" if left out.
     #[serde(default)]
     pub micromodulus: MicromodulusSpec,
     /// Energy per area of a new crack, from which the critical stretch of bonds follows; without it and `critical-stretch` no bond breaks.
@@ -373,39 +373,39 @@ pub struct PeridynamicsSpec {
     /// Bond weights.
     #[serde(default)]
     pub weights: WeightsSpec,
-    /// What share of a cell counts that the horizon cuts (SAND2015-7998 section 5.2.1); all but "full" need `points.lattice`.
+    /// Partial volume of a cell that the horizon cuts (SAND2015-7998 section 5.2.1); all but "full" need `points.lattice`.
     #[serde(default)]
     #[schemars(with = "Option<VolumesSpec>")]
     pub volumes: Option<toml::Spanned<VolumesSpec>>,
     /// Influence function of state-based laws; `{ degree = 3, alpha = 0 }` if left out.
     #[serde(default)]
     pub influence: Option<InfluenceSpec>,
-    /// Where the points are; a lattice if left out, as fine as the cells of the zone where they are alike, else a third of the horizon.
+    /// Positions of the points; a lattice if left out, as fine as the cells of the zone where they are alike, else a third of the horizon.
     #[serde(default)]
     pub points: Option<PointsSpec>,
-    /// How the force of a bond depends on the displacement; "linear" without damage and "exact" with it if left out.
+    /// Dependence of the bond force on the displacement; "linear" without damage and "exact" with it if left out.
     #[serde(default)]
     #[schemars(with = "Option<super::motion::BondsSpec>")]
     pub bonds: Option<toml::Spanned<super::motion::BondsSpec>>,
-    /// What finite elements of the points' materials follow; "linear" if left out.
+    /// Constitutive law of the finite elements of the points' materials; "linear" if left out.
     #[serde(default)]
     #[schemars(with = "Option<super::motion::ElementsSpec>")]
     pub elements: Option<toml::Spanned<super::motion::ElementsSpec>>,
-    /// How the weights of bonds are kept in motion.
+    /// Storage of the weights of bonds in scenes in time and load steps; "double" if left out.
     #[serde(default)]
     #[schemars(with = "Option<super::motion::PrecisionSpec>")]
     pub precision: Option<toml::Spanned<super::motion::PrecisionSpec>>,
-    /// What a fracture energy is taken from; the lattice at hand if left out.
+    /// Calibration of the critical stretch to a fracture energy; "lattice" if left out.
     #[serde(default)]
     #[schemars(with = "Option<super::motion::CalibrationSpec>")]
     pub calibration: Option<toml::Spanned<super::motion::CalibrationSpec>>,
-    /// Whether the mesh's own boundary (a hole, a notch) cuts bonds.
+    /// Treatment of bonds across the mesh's own boundary (a hole, a notch); "cut" if left out.
     #[serde(default)]
     pub surfaces: SurfacesSpec,
 }
 
 impl PeridynamicsSpec {
-    /// Whether a horizon is typed that is no number.
+    /// Returns true if a horizon is typed that is not constant.
     pub fn horizon_varies(&self) -> bool {
         let typed = self.horizon.as_ref();
         typed.is_some_and(|h| h.as_constant().is_none())
@@ -440,7 +440,7 @@ pub enum VolumesSpec {
     Exact,
 }
 
-/// Where the peridynamic points are.
+/// Positions of the peridynamic points.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum PointsSpec {
@@ -462,7 +462,7 @@ pub struct LatticeSpec {
     pub origin: Option<Coordinates>,
 }
 
-/// Whether the boundary of the mesh cuts bonds.
+/// Treatment of bonds across the boundary of the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SurfacesSpec {

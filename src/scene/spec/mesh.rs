@@ -34,7 +34,7 @@ pub struct LineMeshSpec {
     pub min: Coordinates,
     /// Right end.
     pub max: Coordinates,
-    /// How the line is divided.
+    /// Division of the line into cells.
     #[schemars(with = "AxisSpec")]
     pub x: Spanned<AxisSpec>,
     /// Intervals left out, by name.
@@ -50,10 +50,10 @@ pub struct RectangleMeshSpec {
     pub min: Coordinates,
     /// Largest corner.
     pub max: Coordinates,
-    /// How the x axis is divided.
+    /// Division of the x axis into cells.
     #[schemars(with = "AxisSpec")]
     pub x: Spanned<AxisSpec>,
-    /// How the y axis is divided.
+    /// Division of the y axis into cells.
     #[schemars(with = "AxisSpec")]
     pub y: Spanned<AxisSpec>,
     /// Shape of the cells.
@@ -72,13 +72,13 @@ pub struct BoxMeshSpec {
     pub min: Coordinates,
     /// Largest corner.
     pub max: Coordinates,
-    /// How the x axis is divided.
+    /// Division of the x axis into cells.
     #[schemars(with = "AxisSpec")]
     pub x: Spanned<AxisSpec>,
-    /// How the y axis is divided.
+    /// Division of the y axis into cells.
     #[schemars(with = "AxisSpec")]
     pub y: Spanned<AxisSpec>,
-    /// How the z axis is divided.
+    /// Division of the z axis into cells.
     #[schemars(with = "AxisSpec")]
     pub z: Spanned<AxisSpec>,
     /// Shape of the cells.
@@ -95,7 +95,7 @@ pub struct BoxMeshSpec {
 pub struct FileMeshSpec {
     /// The file, relative to the scene.
     pub path: Text,
-    /// What becomes of cells of second order.
+    /// Treatment of cells of second order; "kept" if left out.
     #[serde(default)]
     pub order: FileOrderSpec,
     /// A mesh in memory that stands for the file; the source of the scene has it.
@@ -124,7 +124,7 @@ pub struct CutoutSpec {
     pub max: Coordinates,
 }
 
-/// How an axis of a generated mesh is divided.
+/// Division of an axis of a generated mesh into cells.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum AxisSpec {

@@ -1,8 +1,8 @@
-//! What a scene file holds, as typed. The JSON Schema is made from these types and their comments.
+//! Content of a scene file, as typed. The JSON Schema is made from these types and their comments.
 //!
 //! Every choice is a table of one key (`[coupling.splice]`), so that an error is underlined at its own token.
 //!
-//! | file | what is typed |
+//! | file | content |
 //! |---|---|
 //! | `mesh.rs` | the mesh |
 //! | `material.rs`, `named_law.rs`, `user_material.rs` | materials and peridynamics; laws known by their key; compiled routines |
@@ -10,7 +10,7 @@
 //! | `region.rs` | shapes and zones |
 //! | `coupling.rs` | the coupling |
 //! | `condition.rs`, `impactor.rs` | conditions and voids, rigid impactors |
-//! | `motion.rs` | time and load steps, initial fields, what may break |
+//! | `motion.rs` | time and load steps, initial fields, deformation and fracture of bonds |
 //! | `control.rs` | solver and output |
 //! | `table.rs` | tables of numbers |
 
@@ -83,7 +83,7 @@ pub struct SceneSpec {
     /// The relative error that is wanted, 0.01 for 1 %: coupling, mesh, horizon, points and zone, as far as the scene leaves them out, are chosen for it.
     #[serde(default)]
     pub accuracy: Option<Number>,
-    /// How the body stands for a three-dimensional solid; fixes the dimension.
+    /// Kinematic assumption by which the body represents a three-dimensional solid; fixes the dimension.
     #[schemars(with = "KinematicsSpec")]
     pub kinematics: Spanned<KinematicsSpec>,
     /// The mesh: generated, or read from a file.
@@ -96,15 +96,15 @@ pub struct SceneSpec {
     /// Horizon, points and weights of the peridynamic region; needed unless the coupling is `local`.
     #[serde(default)]
     pub peridynamics: Option<PeridynamicsSpec>,
-    /// Where the body is nonlocal and where the two models overlap; all else is local. "auto" finds it out.
+    /// Nonlocal zone of the body, and transition zone where the two models overlap; all else is local. With "auto" the program places the zone.
     #[serde(default)]
     #[schemars(schema_with = "zones_schema")]
     pub zones: ZonesSpec,
-    /// How the two models are joined; also as text where no option is set, `coupling = "splice"`. Without it `truncated` where that is exact, or else `splice`; the run says which and why.
+    /// Coupling of the two models; also as text where no option is set, `coupling = "splice"`. Without it `truncated` where that is exact, or else `splice`; the run says which and why.
     #[serde(default)]
     #[schemars(schema_with = "coupling::coupling_schema")]
     pub coupling: Option<Spanned<CouplingSpec>>,
-    /// What is computed: one state of equilibrium (default), motion in time, or a load that grows; as text where no option is set, `solve = "static"`.
+    /// Type of analysis: one state of equilibrium (default), motion in time, or a load that grows; as text where no option is set, `solve = "static"`.
     #[serde(default)]
     #[schemars(schema_with = "solve_schema")]
     pub solve: Option<Spanned<SolveSpec>>,
@@ -138,7 +138,7 @@ pub struct SceneSpec {
     /// The linear solver.
     #[serde(default)]
     pub solver: SolverSpec,
-    /// What is written, and where.
+    /// Output files: folder, names and content.
     #[serde(default)]
     pub output: OutputSpec,
 }
@@ -172,7 +172,7 @@ fn zones_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
     })
 }
 
-/// How a body of one, two or three dimensions stands for a solid.
+/// Kinematic assumption by which a body of one, two or three dimensions represents a solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum KinematicsSpec {

@@ -1,4 +1,4 @@
-//! How a scene is carried through time or load, what it starts from, and what may break in it.
+//! Analysis of a scene in time or load steps, its initial fields, and the deformation and fracture of its bonds.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -8,7 +8,7 @@ use super::region::ShapeSpec;
 use crate::scene::expression::Expression;
 use crate::scene::value::{Automatic, Coordinates, Count, Every, Number, Steps};
 
-/// What is computed.
+/// Type of analysis.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SolveSpec {
@@ -32,13 +32,13 @@ pub struct ExplicitSpec {
     /// Fraction of the measured stable step that "auto" takes; 0.95 if left out.
     #[serde(default)]
     pub step_fraction: Option<Number>,
-    /// What becomes of a step beyond the stable one; "refuse" if left out.
+    /// Treatment of a step beyond the stable one; "refuse" if left out.
     #[serde(default)]
     pub beyond_limit: BeyondLimitSpec,
     /// Steps that the stiffest sites take in each step of all others; 1 if left out.
     #[serde(default)]
     pub sub_steps: Option<Count>,
-    /// What becomes of a run in which a mode doubles the energy; "refuse" if left out.
+    /// Treatment of a run in which a mode doubles the energy; "refuse" if left out.
     #[serde(default)]
     pub growing_modes: GrowingModesSpec,
     /// Energy gained without work, as a part of the largest energy, at which the run stops; 0.1 if left out.
@@ -61,7 +61,7 @@ pub struct ExplicitSpec {
     pub checkpoint_every: Option<Every>,
 }
 
-/// What becomes of a time step beyond the stable one.
+/// Treatment of a time step beyond the stable one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BeyondLimitSpec {
@@ -72,7 +72,7 @@ pub enum BeyondLimitSpec {
     Shorten,
 }
 
-/// What becomes of a run in which a mode of the coupled model doubles the energy.
+/// Treatment of a run in which a mode of the coupled model doubles the energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum GrowingModesSpec {
@@ -89,10 +89,10 @@ pub enum GrowingModesSpec {
 pub struct QuasiStaticSpec {
     /// Number of load steps of equal length, or the list of their times, the last of which takes the place of `duration`.
     pub steps: Steps,
-    /// What t reaches at the last step; 1 if left out.
+    /// Value of t at the last step; 1 if left out.
     #[serde(default)]
     pub duration: Option<Number>,
-    /// How each step is solved.
+    /// Solution method of each step; "implicit" if left out.
     #[serde(default)]
     pub method: LoadStepSpec,
     /// Out-of-balance force at which a step is solved, relative to the largest forces of this load step and at the end of the last; 1e-8 if left out.
@@ -112,7 +112,7 @@ pub struct QuasiStaticSpec {
     pub checkpoint_every: Option<Every>,
 }
 
-/// How a load step is solved.
+/// Solution method of a load step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LoadStepSpec {
@@ -123,7 +123,7 @@ pub enum LoadStepSpec {
     Relaxation,
 }
 
-/// What the body starts from, where it does not start at rest.
+/// Initial displacement or velocity, where the body does not start at rest.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum InitialSpec {
@@ -133,11 +133,11 @@ pub enum InitialSpec {
     Velocity(InitialFieldSpec),
 }
 
-/// A field at time zero; components left out are zero.
+/// A field at time zero; components left out are zero, or as a field of an earlier name sets them.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct InitialFieldSpec {
-    /// Where; everywhere if left out.
+    /// Region of the field; everywhere if left out.
     #[serde(default)]
     pub inside: Option<ShapeSpec>,
     /// Component along x.
@@ -151,7 +151,7 @@ pub struct InitialFieldSpec {
     pub z: Option<Expression>,
 }
 
-/// How the force of a bond depends on the displacement.
+/// Dependence of the bond force on the displacement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BondsSpec {
@@ -161,7 +161,7 @@ pub enum BondsSpec {
     Linear,
 }
 
-/// What finite elements of the points' materials follow.
+/// Constitutive law of the finite elements of the points' materials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ElementsSpec {
@@ -172,7 +172,7 @@ pub enum ElementsSpec {
     CauchyBorn,
 }
 
-/// How the weights of bonds are kept in motion.
+/// Storage of the weights of bonds in scenes in time and load steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum PrecisionSpec {
@@ -183,14 +183,14 @@ pub enum PrecisionSpec {
     Single,
 }
 
-/// How the critical stretch follows from a fracture energy.
+/// Calibration of the critical stretch to a fracture energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CalibrationSpec {
-    /// A plane of the lattice, pulled apart bond by bond, takes it.
+    /// By the energy that a plane of the lattice takes, pulled apart bond by bond.
     #[default]
     Lattice,
-    /// The integral over a continuous family does, as in papers: the lattice takes a few per cent more or less.
+    /// By the integral over a continuous family, as in papers: the lattice takes a few per cent more or less.
     Continuum,
 }
 
@@ -212,7 +212,7 @@ pub struct ContactSpec {
 pub struct TipSpec {
     /// The direction in which the crack runs.
     pub direction: Coordinates,
-    /// Where to look; everywhere if left out.
+    /// Region in which the tip is sought; everywhere if left out.
     #[serde(default)]
     pub inside: Option<ShapeSpec>,
     /// Damage from which a point counts; 0.35 if left out.

@@ -31,11 +31,11 @@ pub struct NamedSpec {
     pub tearing_parameter: Option<Number>,
     /// The cells that this material fills.
     pub cells: Option<CellsSpec>,
-    /// What the law takes of its own, in the order of [`Named::parameters`]; none where one is left out that has a default.
+    /// Parameters of the law's own, in the order of [`Named::parameters`]; none where one is left out that has a default.
     pub parameters: Vec<Option<Given>>,
 }
 
-/// What a scene gives for a parameter of a law.
+/// Value that a scene gives for a parameter of a law.
 #[derive(Clone, Debug)]
 pub enum Given {
     /// A number.
@@ -81,7 +81,7 @@ static FIELDS: LazyLock<Vec<Vec<&'static str>>> = LazyLock::new(|| {
     Named::ALL.iter().map(of).collect()
 });
 
-/// Whether materials of a law have a common key.
+/// Returns true if materials of a law have this common key.
 fn takes(law: Named, key: &str) -> bool {
     match key {
         "poisson-ratio" => law.ratio() == Ratio::Any,

@@ -8,7 +8,7 @@ use toml::Spanned;
 
 use crate::scene::value::{Coordinates, Number, Text};
 
-/// Where the body is nonlocal, and where the two models overlap. All else is local.
+/// Nonlocal zone of the body, and transition zone where the two models overlap. All else is local.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ZonesSpec {
@@ -24,7 +24,7 @@ pub struct ZonesSpec {
     #[serde(default)]
     #[schemars(with = "Option<TransitionSpec>")]
     pub transition: Option<Spanned<TransitionSpec>>,
-    /// What is done when damage reaches the edge of the nonlocal zone; "stop" if left out.
+    /// Action when damage reaches the edge of the nonlocal zone; "stop" if left out.
     #[serde(default)]
     #[schemars(with = "Option<EdgeSpec>")]
     pub damage_at_edge: Option<Spanned<EdgeSpec>>,
@@ -40,11 +40,11 @@ pub struct ZonesSpec {
     pub bodies: BTreeMap<Text, BodySpec>,
 }
 
-/// Where the body is nonlocal by itself: at cracks and voids, where the local model errs, where bonds may break.
+/// Criteria by which the nonlocal zone is placed: cracks and voids, the error of the local model, bonds that may break.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct AutoSpec {
-    /// Fraction of the critical stretch from which a bond is taken to be near its end; 0.5 if left out.
+    /// Fraction of the critical stretch from which a bond is taken to be near breaking; 0.5 if left out.
     #[serde(default)]
     pub stretch: Option<Number>,
     /// Horizons by which what is marked is padded, at least 1; 1 if left out, and 2 around cracks, voids and notches.
@@ -55,17 +55,17 @@ pub struct AutoSpec {
     pub tolerance: Option<Number>,
 }
 
-/// How the nonlocal zone follows the crack.
+/// Settings of a nonlocal zone that follows the crack.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct FollowSpec {
-    /// Fraction of the critical stretch from which on a cell is wanted; 0.8 if left out.
+    /// Fraction of the critical stretch from which a cell is wanted in the zone; 0.8 if left out.
     #[serde(default)]
     pub stretch: Option<Number>,
-    /// How far the zone reaches beyond such cells when it changes; five horizons if left out.
+    /// Distance by which the zone extends beyond such cells when it changes; five horizons if left out.
     #[serde(default)]
     pub padding: Option<Number>,
-    /// How far it reaches ahead of the tips of cracks when it changes; 1.5 paddings if left out.
+    /// Distance by which it extends ahead of the tips of cracks when it changes; 1.5 paddings if left out.
     #[serde(default)]
     pub ahead: Option<Number>,
 }
@@ -82,7 +82,7 @@ pub struct BodySpec {
     pub spacing: Number,
 }
 
-/// Where elements cover the nonlocal zone.
+/// Layer of elements that covers the nonlocal zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SkinSpec {
@@ -226,13 +226,13 @@ pub struct NearSpec {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct WithoutSpec {
-    /// What remains.
+    /// Shape from which the other is removed.
     pub from: ShapeSpec,
-    /// What is taken away.
+    /// Shape that is removed.
     pub removed: ShapeSpec,
 }
 
-/// What is done when damage reaches the edge of the nonlocal zone.
+/// Action when damage reaches the edge of the nonlocal zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum EdgeSpec {

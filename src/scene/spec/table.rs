@@ -16,7 +16,7 @@ pub struct TableSpec {
     /// A file of two columns, relative to the scene; arguments increase.
     #[serde(default)]
     pub file: Option<Text>,
-    /// What expressions hold of it.
+    /// The table that expressions share; its rows may come later.
     #[serde(skip)]
     pub(crate) held: Option<Table>,
 }

@@ -28,22 +28,22 @@ pub struct UmatSpec {
     /// PROPS, the numbers that the routine takes.
     #[serde(default)]
     pub constants: Vec<Number>,
-    /// NSTATV, how many numbers the routine remembers of a point; 0 if left out.
+    /// NSTATV, the number of history variables of a point; 0 if left out.
     #[serde(default)]
     pub state: Option<Count>,
-    /// How large strains and rotations may become.
+    /// Admissible magnitude of strains and rotations.
     #[serde(default)]
     pub strains: StrainsSpec,
-    /// What the energies are taken from.
+    /// Source of the energies.
     #[serde(default)]
     pub energies: EnergiesSpec,
-    /// Where the tangent of Newton's method comes from.
+    /// Source of the tangent of Newton's method.
     #[serde(default)]
     pub tangent: TangentSpec,
-    /// Whether the routine keeps no common state, so that several calls may run at a time; no if left out.
+    /// True if the routine keeps no common state, so that several calls may run at a time; false if left out.
     #[serde(default)]
     pub thread_safe: bool,
-    /// Whether cells with several quadrature points take the mean of their dilatation, as Abaqus' fully integrated ones do; yes if left out.
+    /// True if cells with several quadrature points take the mean of their dilatation, as Abaqus' fully integrated ones do; true if left out.
     #[serde(default)]
     pub mean_dilatation: Option<bool>,
     /// TEMP; 0 if left out.
@@ -55,7 +55,7 @@ pub struct UmatSpec {
     /// Strength of the zero-energy control relative to the bonds of an LPS; 1 if left out, 0 switches it off.
     #[serde(default)]
     pub stabilisation: Option<Number>,
-    /// What resists deformations that are not uniform: a bond force, one by the lengths of bonds alone, or a drag (in explicit dynamics).
+    /// Resistance to deformations that are not uniform: a bond force, one by the lengths of bonds alone, or a drag (in explicit dynamics).
     #[serde(default)]
     pub zero_energy_control: ControlSpec,
     /// Stretch at which a bond breaks.
@@ -66,7 +66,7 @@ pub struct UmatSpec {
     pub cells: Option<CellsSpec>,
 }
 
-/// What resists zero-energy modes, in the order of [`crate::peridynamics::ZeroEnergyControl::WORDS`].
+/// Resistance to zero-energy modes, in the order of [`crate::peridynamics::ZeroEnergyControl::WORDS`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ControlSpec {
@@ -79,7 +79,7 @@ pub enum ControlSpec {
     Drag,
 }
 
-/// How large strains and rotations may become.
+/// Admissible magnitude of strains and rotations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum StrainsSpec {
@@ -90,7 +90,7 @@ pub enum StrainsSpec {
     Large,
 }
 
-/// What energies are taken from.
+/// Source of the energies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum EnergiesSpec {
@@ -101,7 +101,7 @@ pub enum EnergiesSpec {
     Routine,
 }
 
-/// Where the tangent of Newton's method comes from.
+/// Source of the tangent of Newton's method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum TangentSpec {

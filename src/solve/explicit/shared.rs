@@ -1,23 +1,23 @@
-//! Steps in which each process moves its own sites and ghosts, and what gathers all sites where they are asked for.
+//! Steps in which each process moves its own sites and ghosts, and the gathering of all sites where they are asked for.
 
 use super::sums::{Sums, total};
 use super::{Energies, Explicit, Reading, SITES};
 use crate::system::{ExactSum, FailureUpdate, LostToBreaks, Segments, Traffic};
 
-/// What belongs to steps that processes share.
+/// Data of time steps that processes share.
 pub(super) struct Shared {
     /// Velocity half a step ago, of sites that are moved here; empty before the first step.
     half: Vec<f64>,
-    /// Whether the numbers of all sites are those of the present step.
+    /// True if the numbers of all sites are those of the present step.
     is_whole: bool,
 }
 
-/// What a force has done to bonds.
+/// Bonds broken by a force evaluation.
 #[derive(Default)]
 pub(super) struct Outcome {
     /// Bonds that broke.
     pub broken: u64,
-    /// What they cost, where that is still to be added over processes.
+    /// Energy and area that they cost, where these are still to be added over processes.
     pub lost: LostToBreaks,
 }
 

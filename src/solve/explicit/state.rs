@@ -1,15 +1,15 @@
-//! What an explicit motion is driven by, what it carries from step to step, and why it stops.
+//! Drive of an explicit motion, its state from step to step, and its errors.
 
 use crate::system::{Halfway, SemiDiscrete};
 
-/// What drives a motion: external forces and prescribed displacements, as functions of time.
+/// Drive of a motion: external forces and prescribed displacements, as functions of time.
 ///
 /// Nothing here may depend on what was called before, or a resumed run would differ from one that never stopped.
 pub trait Drive: Sync {
     /// Overwrites `load` with the external force on every dof \[N\] at `time` \[s\].
     fn load_into(&self, time: f64, load: &mut [f64]);
 
-    /// Whether the load is the same at all times; it is then evaluated once.
+    /// Returns true if the load is constant in time; it is then evaluated once.
     fn is_steady(&self) -> bool {
         false
     }
@@ -93,12 +93,12 @@ impl State {
     }
 }
 
-/// How a motion is stepped.
+/// Parameters of the time integration.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct ExplicitParams {
     /// Time step Δt \[s\]; [`crate::solve::stable_step`] finds one and refuses those that are too large.
     pub step: f64,
-    /// The run stops once the kinetic energy exceeds this many times what was supplied.
+    /// The run stops once the kinetic energy exceeds this many times the energy supplied.
     pub runaway: f64,
 }
 
@@ -128,7 +128,7 @@ pub struct Energies {
     pub work_half: f64,
 }
 
-/// What a run did.
+/// Summary of a run.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct ExplicitInfo {
     /// Steps taken by this call.
@@ -137,11 +137,11 @@ pub struct ExplicitInfo {
     pub time: f64,
     /// Bonds broken by this call.
     pub broken: u64,
-    /// Why it ended.
+    /// Reason for its end.
     pub end: End,
 }
 
-/// Why a run ended.
+/// Reason for the end of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum End {
@@ -151,7 +151,7 @@ pub enum End {
     Stopped,
 }
 
-/// Why a motion cannot start or go on.
+/// Failure to start or to continue a motion.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ExplicitError {
     /// An input has the wrong length.
@@ -224,7 +224,7 @@ pub enum ExplicitError {
     },
 }
 
-/// Whether state, step, masses and prescribed dofs are those of a motion of this system.
+/// Checks that state, step, masses and prescribed dofs are those of a motion of this system.
 pub(super) fn check(
     system: &dyn SemiDiscrete,
     params: &ExplicitParams,

@@ -22,7 +22,7 @@ pub(super) struct Power {
     pub sum: ExactSum,
     /// `Σ |f v|`.
     pub absolute: ExactSum,
-    /// Whether there is any: most chunks have no load.
+    /// True if a load does work here: most chunks have none.
     is_there: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Solves with the consistent tangent of finite elements, and when its factors are made anew.
+//! Solves with the consistent tangent of finite elements, and the renewal of its factors.
 //!
 //! The tangent at a displacement is `K₀ + ΔK` where elements are all that is not linear ([`ElementTangent`]): products are exact, and corrections converge quadratically. Beside
 //! other forces that are not linear, `ΔK` is a product and only those forces are differenced.
@@ -196,7 +196,7 @@ impl Run<'_> {
         }
     }
 
-    /// Whether the tangent is symmetric with that of the elements.
+    /// Returns the symmetry of the tangent together with that of the elements.
     fn symmetry_with(&self, known: &ElementTangent) -> Symmetry {
         match self.system.symmetry() {
             Symmetry::Symmetric => known.symmetry,

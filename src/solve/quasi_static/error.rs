@@ -1,8 +1,8 @@
-//! Why load steps fail.
+//! Errors of load steps.
 
 use crate::solve::krylov::KrylovError;
 
-/// Why a load step failed.
+/// Failure of a load step.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum QuasiStaticError {
     /// An input has the wrong length.
@@ -28,9 +28,9 @@ pub enum QuasiStaticError {
         residual: f64,
         /// Iterations spent.
         iterations: usize,
-        /// Where the residual is largest.
+        /// Site at which the residual is largest.
         site: usize,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
     },
     /// Damped motion that grows.
@@ -44,7 +44,7 @@ pub enum QuasiStaticError {
         time: f64,
         /// Passes so far.
         iterations: usize,
-        /// Where the residual is largest.
+        /// Site at which the residual is largest.
         site: usize,
     },
     /// Bonds never stop breaking.
@@ -70,10 +70,10 @@ pub enum QuasiStaticError {
         time: f64,
         /// Why.
         source: KrylovError,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
     },
-    /// Whoever listens asked for the end, within a load step.
+    /// The listener asked for the end, within a load step.
     #[error("load step {step} at time {time} was interrupted")]
     Interrupted {
         /// The load step.

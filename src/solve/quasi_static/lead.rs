@@ -1,8 +1,8 @@
-//! What leads the corrections of a load step.
+//! Factors that precondition the corrections of a load step, and their iterations so far.
 
 use crate::solve::krylov::LinearMap;
 
-/// What precedes a correction within a load step.
+/// Preconditioner of the corrections within a load step.
 #[derive(Default)]
 pub(super) struct Lead {
     /// Factors of a tangent of this load step.
@@ -11,7 +11,7 @@ pub(super) struct Lead {
     pub spent: usize,
     /// Iterations of the correction before.
     pub last: usize,
-    /// Whether new factors have led hardly better than those before: what elements do not have decides.
+    /// True if new factors have led hardly better than those before: the part of the tangent that elements do not have decides.
     pub is_useless: bool,
     /// Factorisations within the load step.
     pub factorisations: usize,

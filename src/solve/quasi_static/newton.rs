@@ -116,7 +116,7 @@ impl Run<'_> {
         }
     }
 
-    /// What the tangent makes of the residual at `u`, and iterations; `before` is the size of the residual at the correction before, zero at the first, `spent` are the iterations so far, `known` is what elements have of the tangent if that is computed.
+    /// Solves for the correction of the displacement by the residual at `u`, and counts iterations; `before` is the size of the residual at the correction before, zero at the first, `spent` are the iterations so far, `known` is what elements have of the tangent if that is computed.
     fn correction(
         &mut self,
         u: &[f64],
@@ -176,7 +176,7 @@ impl Run<'_> {
         Ok((correction, iterations.max(1)))
     }
 
-    /// Whether there is another tangent to try where this one leads nowhere: that at the present displacement after that at rest, and the other way round where elements know the present one and it leads from the start.
+    /// Returns true if there is another tangent to try where this one leads nowhere: that at the present displacement after that at rest, and the other way round where elements know the present one and it leads from the start.
     fn has_other_tangent(&self) -> bool {
         match self.tangent {
             Tangent::AtRest => !self.is_whole,

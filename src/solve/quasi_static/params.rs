@@ -1,10 +1,10 @@
-//! How load steps are solved.
+//! Parameters of load steps.
 
 use crate::progress::{Progress, Silent};
 use crate::solve::krylov::LinearMap;
 use crate::system::{ElementTangent, Symmetry};
 
-/// How equilibrium is found.
+/// Method by which equilibrium is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Equilibrium {
@@ -15,10 +15,10 @@ pub enum Equilibrium {
     Relaxation,
 }
 
-/// When a load step is done.
+/// Method and stopping criteria of a load step.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct QuasiStaticParams {
-    /// How equilibrium is found.
+    /// Method by which equilibrium is found.
     pub equilibrium: Equilibrium,
     /// `‖f − F‖₂` on free dofs to be reached, relative to the norm of all internal and external forces, or of those in equilibrium before bonds broke
     /// in this load step.
@@ -45,18 +45,18 @@ pub trait Refactor: Sync {
     /// Factors of the tangent of [`Aids::near`] with what `elements` have beyond it; none where a tangent that is to be symmetric has directions of no or negative stiffness.
     fn factors(&self, elements: &ElementTangent, symmetry: Symmetry) -> Option<Box<dyn LinearMap>>;
 
-    /// How many iterations take as long as a factorisation.
+    /// Returns the number of iterations that take as long as a factorisation.
     fn worth(&self) -> usize;
 }
 
-/// What leads a run, and who hears of it.
+/// Preconditioners of a run, and its listener.
 #[derive(Clone, Copy)]
 pub struct Aids<'a> {
     /// An inverse of the tangent before bonds broke, or something near it, symmetric if the tangent is; it saves Newton's method iterations.
     pub near: Option<&'a dyn LinearMap>,
-    /// Makes factors of the tangent at a displacement where elements know it; without, those of `near` serve throughout.
+    /// Makes factors of the tangent at a displacement where elements know it; if absent, those of `near` serve throughout.
     pub refactor: Option<&'a dyn Refactor>,
-    /// Hears of iterations within a load step, where it may end the run.
+    /// Listener to iterations within a load step; it may end the run there.
     pub progress: &'a dyn Progress,
 }
 

@@ -14,16 +14,16 @@ const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
 /// The least residual, relative to all forces, that is asked for: differences of the lengths of bonds know no more.
 pub const TIGHTEST: f64 = 1e-10;
 
-/// Where there is a load, as much of it as round-off may leave: a body that nothing holds moves until round-off hides any load.
+/// Largest part of a load that round-off may leave: a body that nothing holds moves until round-off hides any load.
 const HIDDEN: f64 = 1e-6;
 
-/// What supports that move would meet if nothing else moved, times this, counts as force: about what an intact body a thousand spacings long resists with.
+/// Factor of the forces that moving supports would meet if nothing else moved; the product counts as force. It is about the resistance of an intact body a thousand spacings long.
 pub(super) const MOVED: f64 = 1e-3;
 
-/// What to do where a load acts.
+/// Remedy where a load acts.
 const UNBORNE: &str = "a load that nothing bears has none: hold the body, take smaller load steps, or prescribe displacements instead of forces";
 
-/// Which tangent a correction is found with.
+/// Tangent by which a correction is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Tangent {
     /// That at rest, broken bonds left out: one pass for a product, and factors at hand.
@@ -49,14 +49,14 @@ pub(super) struct Run<'a> {
     pub time: f64,
     /// From the load step before to this one; of no length at the first.
     pub interval: Interval,
-    /// Which tangent leads to equilibrium in this load step.
+    /// Tangent that leads to equilibrium in this load step.
     pub tangent: Tangent,
-    /// Whether elements know the whole tangent, so that the present one leads from the start.
+    /// True if elements know the whole tangent, so that the present one leads from the start.
     pub is_whole: bool,
     pub lead: Lead,
     /// Relative residuals on the way to the last equilibrium.
     pub residuals: Vec<f64>,
-    /// Whether bonds are broken.
+    /// True if bonds are broken.
     pub is_torn: bool,
 }
 
@@ -66,7 +66,7 @@ pub(super) struct Residual {
     pub size: f64,
     /// The forces that it is measured by.
     pub scale: f64,
-    /// What it has to come to.
+    /// Size at which it is small enough.
     pub enough: f64,
 }
 
@@ -98,7 +98,7 @@ impl Run<'_> {
     /// Reports a step of an iteration.
     ///
     /// # Errors
-    /// [`QuasiStaticError::Interrupted`] where whoever listens asks to end.
+    /// [`QuasiStaticError::Interrupted`] where the listener asks to end.
     pub fn go_on(&self) -> Result<(), QuasiStaticError> {
         self.aids.progress.advance(0);
         match self.aids.progress.asks_to_end() {
@@ -135,12 +135,12 @@ impl Run<'_> {
             .collect()
     }
 
-    /// Whether equilibrium is found by Newton's method.
+    /// Returns true if equilibrium is found by Newton's method.
     pub fn is_newton(&self) -> bool {
         self.params.equilibrium == Equilibrium::Newton
     }
 
-    /// Whether a load acts.
+    /// Returns true if a load acts.
     pub fn is_loaded(&self) -> bool {
         self.load.iter().any(|f| *f != 0.0)
     }

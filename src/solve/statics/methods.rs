@@ -133,7 +133,7 @@ pub(super) fn solve_free(
     direct(problem, free, analyse()?, params, progress, u, info)
 }
 
-/// Whether `Auto` factorises a matrix of `nonzeros` stored scalars whose factorisation costs `cost`.
+/// Returns true if `Auto` factorises a matrix of `nonzeros` stored scalars whose factorisation costs `cost`.
 fn factorises(cost: &FactorCost, nonzeros: usize, memory_limit: Option<u64>) -> bool {
     let fits = memory_limit.is_none_or(|limit| cost.bytes <= limit);
     nonzeros <= ANALYSED && fits && cost.flops <= DIRECT_OPERATIONS * nonzeros as f64

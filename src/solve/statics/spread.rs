@@ -31,7 +31,7 @@ const SETTLING: f64 = 1e-3;
 pub struct SpreadRows<'a> {
     /// Rows of the own sites, ascending.
     pub matrix: &'a BlockCsr,
-    /// Who has the others.
+    /// Partition of the other sites over ranks.
     pub spread: Spread<'a>,
 }
 
@@ -91,7 +91,7 @@ impl LinearMap for SpreadRows<'_> {
 pub struct SpreadProblem<'a> {
     /// The rows of the own sites, those of prescribed dofs included.
     pub rows: SpreadRows<'a>,
-    /// Whether `K = Kᵀ`.
+    /// Symmetry of `K`.
     pub symmetry: Symmetry,
     /// Position of each site; unused components are zero.
     pub positions: &'a [[f64; 3]],

@@ -7,7 +7,7 @@ use bondline_terminal::tell;
 /// Exit status of a run that was interrupted, as shells have it.
 pub const INTERRUPTED: u8 = 130;
 
-/// What Ctrl-C or a termination sets, and what it waits for.
+/// Flags that Ctrl-C or a termination sets and reads.
 #[derive(Debug, Default)]
 pub struct Interrupt {
     /// Set by the signal.

@@ -1,10 +1,10 @@
-//! What only the program has, and not the library: the process around a run.
+//! Parts that only the program has, and not the library: the process around a run.
 //!
 //! | file | what |
 //! |---|---|
 //! | `fields.rs` | the list of fields |
 //! | `interrupt.rs` | signals |
-//! | `threads.rs` | how many threads compute |
+//! | `threads.rs` | the number of threads |
 //! | `verify.rs` | the program of the suites, which is built apart |
 
 pub mod fields;

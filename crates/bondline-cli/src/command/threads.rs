@@ -1,17 +1,17 @@
-//! How many threads compute.
+//! Number of threads of a computation.
 
 /// More threads than this for each core are refused unless they are asked for twice: every one of them costs time and none gains any.
 const MOST_PER_CORE: usize = 4;
 
-/// The variable by which rayon can be told a number of threads.
+/// The variable by which rayon reads its number of threads.
 const VARIABLE: &str = "RAYON_NUM_THREADS";
 
-/// Whether more threads than cores can use have been asked for knowingly.
+/// Permission to use more threads than the cores can serve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Oversubscribe {
     /// By `--oversubscribe`.
     Allowed,
-    /// Not.
+    /// Not given.
     Refused,
 }
 

@@ -10,7 +10,7 @@ const NAME: &str = "bondline-verify";
 /// Becomes the program of the suites, with the same arguments, streams, signals and exit status.
 ///
 /// # Errors
-/// Where it does not lie beside this program, or does not start.
+/// Fails if that program does not lie beside this one, or does not start.
 pub fn start(program: std::io::Result<PathBuf>, arguments: &[OsString]) -> miette::Result<u8> {
     let this = program
         .map_err(|e| miette::miette!("cannot find this program, beside which {NAME} lies: {e}"))?;
@@ -30,7 +30,7 @@ pub fn start(program: std::io::Result<PathBuf>, arguments: &[OsString]) -> miett
         .map_err(|e| miette::miette!("cannot start {}: {e}; build it again", program.display()))
 }
 
-/// Where the program of the suites lies for a program at `this`.
+/// Returns the path of the program of the suites for a program at `this`.
 fn beside(this: &Path) -> PathBuf {
     this.with_file_name(format!("{NAME}{}", std::env::consts::EXE_SUFFIX))
 }

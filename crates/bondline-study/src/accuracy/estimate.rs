@@ -19,7 +19,7 @@ const ZOOMS: usize = 50;
 /// The factor by which predictions are judged; `CHOICES` and `CHECKS` say how many keep to it.
 pub const SPREAD: f64 = 3.0;
 
-/// How many errors that a choice predicted were within [`SPREAD`] of the measured ones; `docs/choosing.md` says of which scenes.
+/// Share of the errors predicted by a choice that were within [`SPREAD`] of the measured ones; `docs/choosing.md` says of which scenes.
 pub(super) const CHOICES: &str = "63 of 65 choices";
 
 /// The same of errors that are predicted from versions of a complete scene.

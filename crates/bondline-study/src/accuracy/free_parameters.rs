@@ -1,4 +1,4 @@
-//! What a scene leaves open, and the keys of a candidate.
+//! Parameters that a scene leaves open, and the keys of a candidate.
 
 use crate::variants::{self, Base, coordinates};
 use bondline::scene::Source;
@@ -25,7 +25,7 @@ pub(super) struct AccuracyRequest {
     idle: Vec<String>,
     /// Cracks around which a zone may be drawn, where the scene draws none: the tables of their shapes.
     around: Option<Vec<toml::Table>>,
-    /// Whether the scene itself asks for peridynamics somewhere.
+    /// True if the scene itself asks for peridynamics somewhere.
     pub wants_points: bool,
 }
 
@@ -56,7 +56,7 @@ fn at<'a>(table: &'a toml::Table, path: &[&str]) -> Option<&'a toml::Value> {
     here.get(*last)
 }
 
-/// Whether the scene itself says where it is nonlocal, or leaves that to `zones.auto`.
+/// Returns true if the scene itself says where it is nonlocal, or leaves that to `zones.auto`.
 fn zoned(spec: &SceneSpec) -> bool {
     spec.zones.nonlocal.is_some() || spec.zones.auto.is_some()
 }
@@ -77,7 +77,7 @@ fn wanted_error(spec: &SceneSpec, source: &Source) -> Result<Option<f64>, SceneE
 }
 
 impl AccuracyRequest {
-    /// What a scene with an `accuracy` leaves open; `None` without one.
+    /// Reads the parameters that a scene with an `accuracy` leaves open; `None` without one.
     pub fn of(source: &Source) -> Result<Option<Self>, SceneError> {
         let table = source.table()?;
         if !table.contains_key("accuracy") {
@@ -173,12 +173,12 @@ impl AccuracyRequest {
         .shown_in(source))
     }
 
-    /// Whether the spacing is open at all.
+    /// Returns true if the spacing is open.
     pub fn has_ladder(&self) -> bool {
         self.axes || self.points() && self.lattice
     }
 
-    /// Whether candidates have peridynamic points.
+    /// Returns true if candidates have peridynamic points.
     pub fn points(&self) -> bool {
         self.breaks || self.wants_points
     }
@@ -315,7 +315,7 @@ impl AccuracyRequest {
         list
     }
 
-    /// What errors are measured against: elements alone where the horizon is numerical, else peridynamics everywhere.
+    /// Returns the keys of the reference for errors: elements alone where the horizon is numerical, else peridynamics everywhere.
     pub fn reference(&self, family: &Family, n: usize) -> Vec<String> {
         let coupling = if self.breaks { "nonlocal" } else { "local" };
         let mut list = self.overrides(family, n);

@@ -1,10 +1,10 @@
-//! `accuracy = 0.01`: what a scene leaves open is chosen so that its error is predicted to stay below that, at the least cost;
+//! `accuracy = 0.01`: the parameters that a scene leaves open are chosen so that its error is predicted to stay below that, at the least cost;
 //! and the error of any scene, predicted.
 //!
 //! | file | what |
 //! |---|---|
-//! | `free_parameters.rs` | what a scene leaves open, and the keys of a candidate |
-//! | `sample_run.rs` | small runs of a scene, and how far they are from each other |
+//! | `free_parameters.rs` | parameters that a scene leaves open, and the keys of a candidate |
+//! | `sample_run.rs` | small runs of a scene, and their differences |
 //! | `estimate.rs` | error and order from the differences of pilots; the constants, and where they come from |
 //! | `coarsest_admissible.rs` | the coarsest candidate whose error is small enough, by looking at candidates themselves |
 //! | `refinement_sequence.rs` | a family of candidates, with runs of it from coarse to fine |
@@ -45,7 +45,7 @@ use bondline::scene::Source;
 use bondline::scene::read;
 use bondline::system::Ranks;
 
-/// Why there is nothing to tell of a scene.
+/// Failure of the check of a scene.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckError {
     /// The scene is wrong.
@@ -71,7 +71,7 @@ const PATIENCE: f64 = 30.0;
 /// Seconds that pilots may take whatever the run does.
 pub const LEAST: f64 = 1.0;
 
-/// What a run of a scene file will need, and how large its error will be, without running it; runs of it with other spacings may take so many
+/// Predicts the cost of a run of a scene file, and its error, without running it; runs of it with other spacings may take so many
 /// seconds for the latter, 0.15 of the predicted time or one second if that is left open.
 ///
 /// # Errors
@@ -177,7 +177,7 @@ fn solving(prediction: &Prediction) -> f64 {
     prediction.total_seconds - prediction.timings.seconds("output")
 }
 
-/// The scene with all that its `accuracy` leaves open filled in, and what was chosen; `None` where it has no `accuracy`.
+/// The scene with all that its `accuracy` leaves open filled in, and the choices; `None` where it has no `accuracy`.
 ///
 /// # Errors
 /// [`SceneError`] where the choice cannot be made: nothing runs, or a length of the material is missing.

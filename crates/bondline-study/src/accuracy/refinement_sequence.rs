@@ -31,7 +31,7 @@ const PATIENCE: f64 = 10.0;
 /// Fewest cells along an edge: below, no power law holds.
 const FEWEST: f64 = 2.0;
 
-/// A family with what its pilots told.
+/// A family with its pilots and their fit.
 pub(super) struct Ladder {
     pub family: Family,
     /// Runs with their cells along the shortest edge, from coarse to fine; never empty.
@@ -104,12 +104,12 @@ impl Ladder {
         self.levels.last().map_or(0.0, |(n, _)| *n)
     }
 
-    /// Whether the fit may be trusted for so many cells.
+    /// Returns true if the fit may be trusted for so many cells.
     pub fn reaches(&self, n: f64) -> bool {
         n <= rung(self.growth) * self.finest()
     }
 
-    /// Whether no finer rung is to be climbed.
+    /// Returns true if no finer rung is to be climbed: the last one took too long.
     pub fn slow(&self) -> bool {
         self.levels
             .last()

@@ -51,17 +51,17 @@ fn work(summary: &RunSummary) -> f64 {
     layout + solved
 }
 
-/// Where pilots of one scene run.
+/// Setting in which the pilots of one scene run.
 pub struct Bench {
     source: Source,
     directory: PathBuf,
     folder: TrialFolder,
     common: Vec<String>,
-    /// What is compared; known after the first run.
+    /// Quantities to compare; known after the first run.
     pub quantities: Vec<Quantity>,
     /// Seconds of all pilots.
     pub seconds: f64,
-    /// Why the last pilot did not run.
+    /// Reason why the last pilot did not run.
     pub refusal: Option<String>,
 }
 

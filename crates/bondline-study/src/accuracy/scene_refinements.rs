@@ -91,7 +91,7 @@ pub(crate) fn predicted_error(
     }))
 }
 
-/// Why there are not two runs to compare, and what to do.
+/// Returns the reason why there are not two runs to compare, and the remedy.
 fn unpaid(factors: &[f64], cost: impl Fn(f64) -> f64, refusal: Option<String>) -> String {
     match (factors, refusal) {
         ([.., b, a], _) => {
@@ -125,7 +125,7 @@ fn error(levels: &[(f64, Pilot)], fit: Fit, bench: &Bench) -> Option<f64> {
 /// Seconds of a run grow with its points to this power.
 const GROWTH: f64 = 1.5;
 
-/// How far the coarsest version is from one with peridynamics everywhere; `None` where bonds are not cut, or where that takes too long.
+/// Returns the difference of the coarsest version from one with peridynamics everywhere; `None` where bonds are not cut, or where that takes too long.
 fn of_zones(base: &Base, levels: &[(f64, Pilot)], bench: &mut Bench, seconds: f64) -> Option<f64> {
     let (n, coarsest) = levels.first()?;
     let changes = base.everywhere(1.0 / n)?;

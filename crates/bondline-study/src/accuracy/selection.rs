@@ -20,16 +20,16 @@ pub struct Candidate {
     pub cells: usize,
 }
 
-/// What was chosen.
+/// The choice for a scene.
 #[derive(Clone, Debug)]
 pub struct Chosen {
     /// The keys that the scene leaves open.
     pub overrides: Vec<String>,
-    /// What was chosen, and why.
+    /// The decisions, each with its reason.
     pub choices: Vec<Decision>,
     /// The predicted error; none where nothing that decides it was open.
     pub error: Option<f64>,
-    /// Where it stands on its ladder.
+    /// Its place on its ladder.
     pub candidate: Candidate,
     /// Seconds of all pilots.
     pub seconds: f64,
@@ -74,7 +74,7 @@ fn error(source: &Source, asked: &AccuracyRequest, why: &str) -> SceneError {
     .shown_in(source)
 }
 
-/// Why a candidate is chosen, and the error that is predicted for it.
+/// Returns the reasons for a candidate, and the error that is predicted for it.
 fn explained(
     asked: &AccuracyRequest,
     ladder: &Ladder,

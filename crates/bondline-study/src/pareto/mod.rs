@@ -1,15 +1,15 @@
-//! What speed costs in accuracy: a scene run with its knobs turned, each case measured against a reference.
+//! Cost against accuracy: a scene run with its knobs turned, each case measured against a reference.
 //!
 //! | file | what |
 //! |---|---|
-//! | `parameters.rs` | what a study is asked, what its cases are, how it ends |
+//! | `parameters.rs` | parameters, cases and end of a study |
 //! | `trial.rs` | one case in a process of its own: its cost, its outcome |
 //! | `surrogate.rs` | guesses of cost and error for cases that were not run; the Pareto front |
 //! | `study.rs` | which case runs next |
-//! | `record.rs` | what is kept of a study, so that it can go on |
+//! | `record.rs` | records of a study, so that it can go on |
 //! | `report.rs` | table, CSV, JSON, plot, and the scene for a wanted error |
 //!
-//! What can be turned in a scene, and how far outputs are apart, is in `crates/bondline-study/src/variants`.
+//! The knobs of a scene, and the differences between outputs, are in `crates/bondline-study/src/variants`.
 //!
 //! First the reference runs, then the scene as it is, then every setting alone. From these, cost and error of every combination are guessed, and the
 //! one that promises the largest gain over the front so far is run, again and again, until none promises any or the time is used up. Every outcome is
@@ -198,7 +198,7 @@ fn horizon_of_cells(
     Ok(found.map(|horizon| format!("peridynamics.horizon={horizon:e}")))
 }
 
-/// What is compared: what is asked for, or all that the reference has.
+/// Returns the quantities to compare: those asked for, or all that the reference has.
 fn quantities_of(measured: &Measured, params: &TradeParams) -> Result<Vec<Quantity>, TradeError> {
     let quantities = if params.quantities.is_empty() {
         measured.quantities()
@@ -294,7 +294,7 @@ pub fn trade(
     })
 }
 
-/// What a study writes into its folder, and its cases below it.
+/// Names of the files that a study writes into its folder, and of its cases below it.
 fn files() -> Files {
     Files {
         name: "trade".to_owned(),

@@ -1,4 +1,4 @@
-//! What a study is asked, what its cases are, and how it ends.
+//! Parameters of a study, its cases, and its end.
 
 use crate::variants::{Knob, Quantity};
 use bondline::observe::ObserveError;
@@ -10,7 +10,7 @@ use std::time::Duration;
 /// Errors below are round-off.
 const ROUND_OFF: f64 = 1e-9;
 
-/// What a case cost.
+/// Cost of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
     /// Seconds of all stages but output.
@@ -23,13 +23,13 @@ pub struct Cost {
     pub unknowns: f64,
 }
 
-/// How a case ended.
+/// Outcome of a case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
     /// It ran.
     Ran {
-        /// What it cost.
+        /// Its cost.
         cost: Cost,
         /// Relative difference from the reference, one per quantity.
         errors: Vec<f64>,
@@ -46,7 +46,7 @@ pub enum Outcome {
     },
 }
 
-/// What errors are measured against.
+/// Reference against which errors are measured.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reference {
     /// Full peridynamics where bonds break or the scene moves, else [`Reference::Finer`].
@@ -59,7 +59,7 @@ pub enum Reference {
     Keys(Vec<String>),
 }
 
-/// What a case costs in the front.
+/// Measure of the cost of a case in the front.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CostBy {
     /// Seconds.
@@ -101,17 +101,17 @@ pub struct TradeParams {
     pub knobs: Vec<String>,
     /// Further knobs, see [`typed`](super::typed).
     pub vary: Vec<Knob>,
-    /// What is compared; empty for what suits the outputs. The error of a case is the largest of them.
+    /// Quantities to compare; empty for those that suit the outputs. The error of a case is the largest of them.
     pub quantities: Vec<Quantity>,
-    /// What it is compared with.
+    /// Reference of the comparison.
     pub reference: Reference,
-    /// What the front is over.
+    /// Measure of cost of the front.
     pub cost: CostBy,
     /// Errors for which the cheapest case is wanted as a scene.
     pub wanted: Vec<f64>,
     /// Time for all cases together.
     pub budget: Duration,
-    /// Folder for tables, plot, scenes and what resuming needs.
+    /// Folder for tables, plot, scenes and records for resuming.
     pub output: PathBuf,
 }
 
@@ -124,7 +124,7 @@ pub struct Case {
     pub overrides: Vec<String>,
     /// A number for the bytes of the mesh file that it read, if it read one.
     pub mesh: Option<u64>,
-    /// How it ended.
+    /// Its outcome.
     pub outcome: Outcome,
     /// Cost and error guessed before it ran, if others had run by then.
     pub guessed: Option<(f64, f64)>,
@@ -152,26 +152,26 @@ impl Case {
     }
 }
 
-/// What a study found.
+/// Results of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trade {
     /// The scene file.
     pub scene: PathBuf,
-    /// What was compared.
+    /// Quantities that were compared.
     pub quantities: Vec<Quantity>,
-    /// The keys of the reference, and what it cost.
+    /// The keys of the reference, and its cost.
     pub reference: (Vec<String>, Cost),
     /// All cases in the order in which they ran.
     pub cases: Vec<Case>,
-    /// What the front is over.
+    /// Measure of cost of the front.
     pub by: CostBy,
     /// Combinations that were not run.
     pub left: usize,
-    /// Why no more were.
+    /// Reason why no more were run.
     pub ended: TradeEnd,
 }
 
-/// Why a study ended.
+/// Reason for the end of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TradeEnd {
     /// No combination promises a better front.
@@ -182,7 +182,7 @@ pub enum TradeEnd {
     Interrupted,
 }
 
-/// Why there is no study.
+/// Failure of a study.
 #[derive(Debug, thiserror::Error)]
 pub enum TradeError {
     /// The scene.
@@ -193,17 +193,17 @@ pub enum TradeError {
     Knob {
         /// Its name.
         knob: String,
-        /// What applies.
+        /// The knobs that apply.
         known: String,
     },
     /// The reference, or the scene itself, does not run.
     #[error("{what} does not run: {why}; {remedy}")]
     Base {
-        /// Which of them.
+        /// Name of the one that does not run.
         what: &'static str,
         /// In the run's words.
         why: String,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
     },
     /// A quantity that the outputs do not have.
@@ -233,7 +233,7 @@ pub enum TradeError {
     File {
         /// Which.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The program could not be started for a case.
@@ -241,7 +241,7 @@ pub enum TradeError {
     Program {
         /// This program.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// A run's summary is no JSON.
@@ -249,7 +249,7 @@ pub enum TradeError {
     Summary {
         /// The summary.
         text: String,
-        /// What is wrong.
+        /// The error of its JSON.
         why: String,
     },
     /// A table, a plot or a scene.

@@ -1,4 +1,4 @@
-//! What is kept of a study, line by line, so that it can go on.
+//! Records of a study, line by line, so that it can go on.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -55,7 +55,7 @@ pub(super) fn mesh(scene: &Source, folder: &Path, overrides: &[String]) -> Optio
     Some(print.value())
 }
 
-/// What the reference left.
+/// Reads the outputs of the reference from its folder.
 pub(super) fn kept(folder: &Path) -> Result<Measured, TradeError> {
     let path = folder.join("summary.json");
     let file_error = |source| TradeError::File {

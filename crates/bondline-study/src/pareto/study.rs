@@ -1,4 +1,4 @@
-//! Which case runs next: each setting alone, then what promises most.
+//! Order of the cases of a study: each setting alone, then the combination that promises most.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -36,7 +36,7 @@ pub(super) struct Study<'a> {
     pub record: std::fs::File,
     pub record_path: PathBuf,
     pub deadline: Instant,
-    /// How long a case may take: some times the reference.
+    /// Longest time that a case may take: some times the reference.
     pub patience: Duration,
 }
 
@@ -44,7 +44,7 @@ pub(super) struct Study<'a> {
 const MOST_COMBINATIONS: usize = 20_000;
 
 impl Study<'_> {
-    /// Runs everything; why it ended.
+    /// Runs everything and returns the reason for its end.
     pub(super) fn all(&mut self, progress: &dyn Progress) -> Result<TradeEnd, TradeError> {
         let singles = 1 + self.settings.len();
         progress.stage("the scene, and each setting alone", Some(singles as u64));

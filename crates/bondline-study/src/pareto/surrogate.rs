@@ -13,7 +13,7 @@ pub(super) struct Effects {
     numbers: Vec<f64>,
 }
 
-/// How strongly numbers are drawn to zero, over one observation.
+/// Ridge parameter that draws the fitted numbers to zero, over one observation.
 const RIDGE: f64 = 1e-2;
 
 impl Effects {
@@ -53,7 +53,7 @@ impl Effects {
     }
 }
 
-/// Which points no other point beats in both: indices, by ascending cost. Points are `(cost, error)`.
+/// Returns the points that no other point beats in both: indices, by ascending cost. Points are `(cost, error)`.
 pub fn front(points: &[(f64, f64)]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..points.len())
         .filter(|&k| points[k].0.is_finite() && points[k].1.is_finite())

@@ -1,4 +1,4 @@
-//! One case in a process of its own: what it costs, and what it leaves.
+//! One case in a process of its own: its cost, and its outputs.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -15,7 +15,7 @@ pub(super) struct Ran {
     pub measured: Measured,
 }
 
-/// What came of running a case.
+/// Outcome of an attempt to run a case.
 pub(super) enum Attempt {
     Ran(Ran),
     Refused(String),
@@ -29,7 +29,7 @@ const LOOK: Duration = Duration::from_millis(5);
 /// Runs below this are repeated, and the fastest counts.
 const SHORT: f64 = 0.5;
 
-/// Where cases run and with what.
+/// Program, scene and interrupt flag with which cases run.
 pub(super) struct Runner<'a> {
     /// This program.
     pub program: &'a Path,
@@ -164,7 +164,7 @@ impl Runner<'_> {
     }
 }
 
-/// What a program complained of, without frames and places, on one line.
+/// Returns the complaint of a program, without frames and places, on one line.
 fn one_line(text: &str) -> String {
     let plain: Vec<&str> = text
         .lines()

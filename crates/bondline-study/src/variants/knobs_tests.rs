@@ -1,4 +1,4 @@
-//! Settings of a plate, and what they combine to.
+//! Settings of a plate, and their combinations.
 
 use super::*;
 use bondline::scene::Source;

@@ -1,11 +1,11 @@
-//! How far the outputs of a run are from those of the reference.
+//! Differences between the outputs of a run and those of the reference.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-/// What is compared.
+/// Quantity to compare.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quantity {
@@ -30,7 +30,7 @@ impl Quantity {
     /// From the command line: `displacement`, `strain`, `reaction`, `energy`, `history.COLUMN`, `path.TIP`, `tip-time.TIP`.
     ///
     /// # Errors
-    /// What is known.
+    /// A message with the known quantities.
     pub fn parse(text: &str) -> Result<Self, String> {
         Ok(match text.split_once('.') {
             None if text == "displacement" => Self::Displacement,
@@ -116,7 +116,7 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Reads what a run left in its folder, and its summary.
+    /// Reads the outputs of a run from its folder, and its summary.
     pub(crate) fn read(folder: &Path, summary: &serde_json::Value) -> std::io::Result<Self> {
         let mut found = Self {
             energy: summary["energy"].as_f64(),
@@ -152,7 +152,7 @@ impl Measured {
         Ok(found)
     }
 
-    /// What suits the outputs: paths of tips, else the probes of the history, else displacements (and forces of conditions).
+    /// Returns the quantities that suit the outputs: paths of tips, else the probes of the history, else displacements (and forces of conditions).
     pub(crate) fn quantities(&self) -> Vec<Quantity> {
         if !self.tips.is_empty() {
             return self.tips.keys().cloned().map(Quantity::Path).collect();
@@ -219,7 +219,7 @@ fn is_component(name: &str, letter: char) -> bool {
     letters.next() == Some(letter) && name.len() > 1 && letters.all(|c| "xyz".contains(c))
 }
 
-/// Whether a column hardly changes.
+/// Returns true if a column is zero throughout, or missing.
 fn still(table: &Columns, name: &str) -> bool {
     let Some(k) = table.index(name) else {
         return true;

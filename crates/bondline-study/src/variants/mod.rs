@@ -1,10 +1,10 @@
-//! Other versions of a scene, and how far their outputs are from each other: what `accuracy` and `bondline trade` choose from and judge by.
+//! Other versions of a scene, and the differences of their outputs: `accuracy` and `bondline trade` choose among them.
 //!
 //! | file | what |
 //! |---|---|
-//! | `parameters.rs` | what can be turned in a scene, and the overrides that it means |
+//! | `parameters.rs` | the knobs of a scene, and the overrides of their settings |
 //! | `generated.rs` | generated meshes as knobs see them |
-//! | `measure.rs` | how far the outputs of a run are from those of the reference |
+//! | `measure.rs` | differences between the outputs of a run and those of the reference |
 
 mod generated;
 mod measure;

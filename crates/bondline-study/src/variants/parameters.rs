@@ -1,4 +1,4 @@
-//! What of a scene trades speed for accuracy: the settings of each knob, and the overrides that several of them make together.
+//! Settings of a scene that trade speed for accuracy: those of each knob, and the overrides that several of them make together.
 
 use super::generated::{Axis, Generated, generated};
 use bondline::scene::SceneSpec;
@@ -16,7 +16,7 @@ pub struct Setting {
     pub(crate) change: Change,
 }
 
-/// What a setting does to a scene.
+/// Change of a scene by a setting.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Change {
     /// Another coupling.
@@ -38,7 +38,7 @@ pub(crate) enum Change {
 pub struct Knob {
     /// Its name: one of [`KNOBS`], or a key of the scene.
     pub name: String,
-    /// What else it can be set to.
+    /// The other settings that it can take.
     pub settings: Vec<Setting>,
 }
 
@@ -232,7 +232,7 @@ impl Base {
         }
     }
 
-    /// What a reference is made of: twice as fine in horizon (unless it is a length of the material), points and elements.
+    /// Returns the changes that make a reference: twice as fine in horizon (unless it is a length of the material), points and elements.
     pub(crate) fn finer(&self) -> Vec<Change> {
         self.scaled(0.5)
     }
@@ -527,7 +527,7 @@ pub(crate) fn corners(spec: &SceneSpec) -> Option<(Vec<f64>, Vec<f64>)> {
 /// A knob that turns a key of the scene: `solver.tolerance=[1e-4, 1e-8]`.
 ///
 /// # Errors
-/// What is wrong with the text, and the remedy.
+/// A message with the fault of the text, and the remedy.
 pub fn typed(text: &str) -> Result<Knob, String> {
     let (key, values) = text.split_once('=').ok_or_else(|| {
         format!("`{text}` has no `=`; write --vary 'solver.tolerance=[1e-4, 1e-8]'")

@@ -5,7 +5,7 @@
 
 use crate::bobaru::line::{Line, Motion, Rule, RungeKutta};
 
-/// Which nodes of the refined zone have the smaller horizon.
+/// Nodes of the refined zone that have the smaller horizon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Horizons {
     /// All of them.
@@ -14,7 +14,7 @@ pub enum Horizons {
     NewNodes,
 }
 
-/// How fields reach new nodes.
+/// Interpolation of the fields at new nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
     /// From the two nodes about them.
@@ -23,7 +23,7 @@ pub enum Interpolation {
     Cubic,
 }
 
-/// How motion is integrated.
+/// Time integration of the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integrator {
     /// Four force passes a step.
@@ -32,7 +32,7 @@ pub enum Integrator {
     Verlet,
 }
 
-/// What is refined, when, and how.
+/// Parameters of the refinement and of the run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
     /// Length of the bar.
@@ -61,7 +61,7 @@ pub struct Plan {
     pub step: f64,
 }
 
-/// What a change of the grid did.
+/// Change of energy and momentum by a change of the grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Change {
     /// Energy after it less energy before it, over that before it.
@@ -157,7 +157,7 @@ impl Adaptive {
         self.steps += 1;
     }
 
-    /// Which intervals of the coarse grid the energies ask to be divided.
+    /// Returns true for each interval of the coarse grid that is to be divided by the energies.
     fn wanted(&self) -> Vec<bool> {
         let energy = self.motion.energy_density(&self.line);
         let largest = energy.iter().copied().fold(0.0, f64::max);
@@ -228,7 +228,7 @@ impl Adaptive {
     }
 }
 
-/// Where the nodes of the coarse grid stand among all.
+/// Returns the indices of the nodes of the coarse grid among all.
 fn starts(divided: &[bool], ratio: usize) -> Vec<usize> {
     let mut at = vec![0];
     for &d in divided {

@@ -15,15 +15,15 @@ pub struct Goal {
     pub intervals: usize,
     /// Horizon over spacing.
     pub m: f64,
-    /// Where the displacement is wanted.
+    /// Position at which the displacement is wanted.
     pub target: f64,
-    /// Where the forces act.
+    /// Positions of the forces, and their values.
     pub loads: Vec<(f64, f64)>,
     /// Change between two grids, relative to the displacement, at which it ends.
     pub tolerance: f64,
     /// Grids at most.
     pub levels: usize,
-    /// Which points must not be seen by coarse nodes.
+    /// Points that must not be seen by coarse nodes.
     pub watch: Watch,
 }
 

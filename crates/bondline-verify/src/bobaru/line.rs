@@ -18,16 +18,16 @@ pub enum Weights {
     Normalised,
 }
 
-/// Whose micromodulus a bond between two horizons has.
+/// Micromodulus of a bond between two horizons.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sharing {
     /// That of the node whose force is summed: the paper's rule, and a splice of [SAND2015-7998] section 2.5. Exact for affine fields, not reciprocal.
     Source,
-    /// The mean of what both ends say: forces are pairs, energy is conserved, affine fields leave a ghost force where the horizon changes.
+    /// The mean of those of both ends: forces are pairs, energy is conserved, affine fields leave a ghost force where the horizon changes.
     Mean,
 }
 
-/// How a bar is discretised.
+/// Discretisation of a bar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rule {
     /// Micromodulus: `InverseDistance`, `Triangular` and `Constant` are the paper's constant, triangular and inverted triangular one.
@@ -134,7 +134,7 @@ impl Line {
         self.x.len()
     }
 
-    /// Whether there are no nodes, which [`Line::new`] never makes.
+    /// Returns true if there are no nodes, which [`Line::new`] never makes.
     pub fn is_empty(&self) -> bool {
         self.x.is_empty()
     }

@@ -11,7 +11,7 @@
 //! | `waves` | Table V; energy, momentum and cost of refinement in dynamics |
 //! | `nested` | the same refinement in a plane, on nested lattices |
 //!
-//! What had to be assumed stands in the rows and in `docs/papers.md`.
+//! Assumptions that had to be made stand in the rows and in `docs/papers.md`.
 
 pub mod adaptive;
 pub mod dynamics;

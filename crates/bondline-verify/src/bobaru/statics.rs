@@ -84,7 +84,7 @@ impl Graded {
     }
 }
 
-/// How far a bar is from the classical `u = x`, in per cent.
+/// Differences of a bar from the classical `u = x`, in per cent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Errors {
     /// At one point, relative to the classical displacement there: what the paper's tables hold.

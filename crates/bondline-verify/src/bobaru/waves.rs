@@ -1,4 +1,4 @@
-//! Table V and refinement in dynamics: what a grid that follows a wave costs, keeps and saves.
+//! Table V and refinement in dynamics: cost, conservation and savings of a grid that follows a wave.
 
 use rayon::prelude::*;
 

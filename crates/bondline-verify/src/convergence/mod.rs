@@ -7,7 +7,7 @@
 //! | `transform.rs` | the convolution that applies it |
 //! | `norms.rs` | error norms, observed orders, medians |
 //! | `study.rs` | all kernels over a range of N |
-//! | `statements.rs` | what the text concludes from its figures, row by row |
+//! | `statements.rs` | statements of the text on its figures, row by row |
 //!
 //! The figures have no numbers in the text; what it concludes from them does, and each conclusion is a row. The norm decides the order: the text
 //! says "L²", and only the norm of the piecewise constant function shows what it reports.

@@ -1,6 +1,6 @@
 //! Error norms, observed orders and medians.
 
-/// Errors of one solution in the three norms that are told apart.
+/// Errors of one solution in the three norms that are distinguished.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
     /// `(Σ h^D |u_i − u(x_i)|²)^½` over the inner points.
@@ -67,7 +67,7 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     }
 }
 
-/// Whether every value is less than the one before.
+/// Returns true if every value is less than the one before.
 pub fn falls(values: &[f64]) -> bool {
     values.windows(2).all(|w| w[1] < w[0])
 }

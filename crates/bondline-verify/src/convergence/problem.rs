@@ -18,7 +18,7 @@ pub const HORIZON: f64 = 0.04;
 /// Relative residual of the error's equation; the error itself is what is solved for, so that its own digits count.
 pub const TOLERANCE: f64 = 1e-9;
 
-/// Which weighted volume the constants are made with.
+/// Weighted volume that the constants are made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WeightedVolume {
     /// The integral (5.12), (5.18), as the text has it.
@@ -40,7 +40,7 @@ pub struct Discretisation {
     pub weighted_volume: WeightedVolume,
 }
 
-/// What a discretisation gave.
+/// Results of a discretisation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
     /// Errors in the inner domain.
@@ -57,7 +57,7 @@ pub struct Outcome {
     pub time: Duration,
 }
 
-/// Why there is none.
+/// Failure of a discretisation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProblemError {
     /// No family.

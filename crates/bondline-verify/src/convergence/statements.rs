@@ -1,4 +1,4 @@
-//! What sections 5.3 to 5.5 conclude from their figures, as rows.
+//! Statements that sections 5.3 to 5.5 conclude from their figures, as rows.
 
 use super::{
     figure,
@@ -14,7 +14,7 @@ use bondline::{
     },
 };
 
-/// How far an order of about one may lie from one.
+/// Tolerance of an order of about one.
 const FIRST_ORDER: f64 = 0.05;
 /// The same in 2D and 3D, where quadrature errors of the stiffness are still in sight at δ/h = 6.
 const FIRST_ORDER_ROUGH: f64 = 0.3;
@@ -86,7 +86,7 @@ pub(super) fn residuals<const D: usize>() -> Table {
     table
 }
 
-/// Which algorithm is more accurate than which, by medians of the nodal error over N.
+/// Compares the accuracy of the algorithms, by medians of the nodal error over N.
 fn accuracy<const D: usize>(study: &Study, table: &mut Table) {
     let norm = Norm::Nodal;
     for alpha in Alpha::ALL {
@@ -170,7 +170,7 @@ fn ratio_row(case: String, quantity: &str, ratio: f64, limit: Option<f64>) -> Ta
     }
 }
 
-/// Which kernels converge with the first order or better, in the norm of the piecewise constant function.
+/// Tests the kernels that are said to converge with the first order or better, in the norm of the piecewise constant function.
 fn orders<const D: usize>(study: &Study, table: &mut Table) {
     let norm = Norm::Piecewise;
     for alpha in Alpha::ALL {

@@ -144,7 +144,7 @@ impl<const D: usize> LinearMap for StencilOperator<D> {
     }
 }
 
-/// How a lattice function behaves when the sign of one coordinate changes.
+/// Parity of a lattice function in one coordinate.
 #[derive(Clone, Copy, PartialEq)]
 enum Parity {
     Even,

@@ -56,7 +56,7 @@ impl Kernel {
     }
 }
 
-/// What the report's figures compare: full volumes with P0, P1 (its PWL), P3 (PWC), P5 (PWQ), P7 (PWS), the other algorithms with P0.
+/// Kernels that the report's figures compare: full volumes with P0, P1 (its PWL), P3 (PWC), P5 (PWQ), P7 (PWS), the other algorithms with P0.
 pub const KERNELS: [Kernel; 8] = {
     use PartialVolume::{Exact, Full, Hhb, PdLammps};
     const fn kernel(algorithm: PartialVolume, degree: Degree) -> Kernel {
@@ -115,9 +115,9 @@ pub struct Curve {
     pub kernel: Kernel,
     /// Exponent of the influence function.
     pub alpha: Alpha,
-    /// N and what it gave, ascending.
+    /// N and its outcome, ascending.
     pub outcomes: Vec<(usize, Outcome)>,
-    /// Why a size has no outcome.
+    /// Reason why a size has no outcome.
     pub failure: Option<String>,
 }
 
@@ -150,7 +150,7 @@ impl Curve {
         observed_order(self.errors(norm, FIT_FROM))
     }
 
-    /// Whether the error falls from every N to the next from [`FIT_FROM`] on.
+    /// Returns true if the error falls from every N to the next from [`FIT_FROM`] on.
     pub fn is_monotone(&self, norm: Norm) -> bool {
         let errors: Vec<f64> = self.errors(norm, FIT_FROM).map(|e| e.1).collect();
         falls(&errors)
@@ -218,7 +218,7 @@ impl Study {
             .unwrap_or_default()
     }
 
-    /// Whether there are enough sizes for an order.
+    /// Returns true if there are enough sizes for an order.
     pub fn fits(&self) -> bool {
         self.sizes().iter().filter(|&&n| n >= FIT_FROM).count() >= 3
     }

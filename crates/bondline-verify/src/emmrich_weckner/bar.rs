@@ -45,7 +45,7 @@ fn hermite(n: usize, x: f64) -> (f64, f64) {
     (last, before)
 }
 
-/// How the bar is discretised.
+/// Discretisation of the bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// Gauss–Hermite quadrature, \[EmmrichWeckner2007\] eq. (2.2).

@@ -21,7 +21,7 @@ use bondline::{
 };
 use continuum::{Continuum, derivative, gauss_legendre};
 
-/// Where continuum fields are looked at.
+/// Positions at which continuum fields are sampled.
 const PLACES: [f64; 5] = [-0.9, -0.35, 0.1, 0.55, 1.2];
 
 type Field = fn(f64) -> f64;

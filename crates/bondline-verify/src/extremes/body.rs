@@ -1,4 +1,4 @@
-//! A scene made to measure, and what its run gives.
+//! A scene made to measure, and the results of its run.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -33,7 +33,7 @@ pub struct Body {
     pub modulus: f64,
     /// Poisson ratio of an LPS; bond-based without.
     pub poisson: Option<f64>,
-    /// How the two are joined.
+    /// Coupling of the two.
     pub coupling: &'static str,
     /// m = δ/h.
     pub ratio: f64,
@@ -161,7 +161,7 @@ impl Body {
     }
 }
 
-/// What a run gives.
+/// Results of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Solved {
     /// Displacements at fixed places, component by component.

@@ -173,7 +173,7 @@ fn slit(coupling: &str, cells: usize, ratio: usize, horizons: f64) -> String {
     )
 }
 
-/// How far a slit opens where the seam comes near, against a seam three horizons off.
+/// Measures the opening of a slit near the seam, against that with a seam three horizons off.
 pub(super) fn beside_seam(effort: Effort) -> Vec<TableRow> {
     let mut rows = Vec::new();
     let finenesses: &[(usize, usize)] = match effort {

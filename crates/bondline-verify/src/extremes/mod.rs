@@ -2,7 +2,7 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `body.rs` | a scene made to measure, and what its run gives |
+//! | `body.rs` | a scene made to measure, and the results of its run |
 //! | `scales.rs` | units, distance from the origin, size of displacements, bonds that turn |
 //! | `laws.rs` | Poisson ratios, m from 1 to 12, continuity through whole m |
 //! | `shapes.rs` | thin cells, small families, zones of one point, fragments, cracks through the seam |

@@ -5,7 +5,7 @@
 
 /// Length of the bar \[mm\]; source: the multi-horizon paper, section 3.
 pub const LENGTH: f64 = 100.0;
-/// Where the horizon changes \[mm\]; the text shows it only in its figure 3. A bar that is all coarse has nodes there too.
+/// Positions at which the horizon changes \[mm\]; the text shows it only in its figure 3. A bar that is all coarse has nodes there too.
 pub const CHANGES: [f64; 2] = [24.0, 76.0];
 /// Spacing of the ends \[mm\].
 pub const FINE: f64 = 0.1;
@@ -23,11 +23,11 @@ pub struct Layout {
     pub x: Vec<f64>,
     /// Lengths of the cells.
     pub volume: Vec<f64>,
-    /// Whether a node has the wide horizon.
+    /// True for each node that has the wide horizon.
     pub wide: Vec<bool>,
     /// Spacing of the fine and of the coarse lattice.
     pub spacing: [f64; 2],
-    /// Where the spacing changes, images included.
+    /// Positions at which the spacing changes, images included.
     pub changes: Vec<f64>,
     step: f64,
     first: usize,
@@ -178,7 +178,7 @@ impl Layout {
     }
 }
 
-/// What a node's force owes to another node.
+/// Bond from a node to another one, directed.
 #[derive(Clone, Copy, Debug)]
 struct Bond {
     end: usize,

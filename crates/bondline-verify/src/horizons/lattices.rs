@@ -21,7 +21,7 @@ use bondline::{
 /// Positions agree within this part of a horizon.
 const TIE: f64 = 1e-9;
 
-/// How the families are made where the horizon changes.
+/// Construction of the families where the horizon changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Families {
     /// Each node's own horizon; a bond pulls at both ends with what either end says.
@@ -49,7 +49,7 @@ impl Solid {
     }
 }
 
-/// What is built.
+/// Parameters of the two lattices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Meeting {
     /// Coarse spacing over the fine one, which is 1.
@@ -156,7 +156,7 @@ impl<const D: usize> Strip<D> {
         (self.meeting.m * if is_wide { self.meeting.ratio } else { 1 }) as f64
     }
 
-    /// What counts of the cell of node `j`, at the distance `r`, in the family of node `i`.
+    /// Returns the part of the cell of node `j`, at the distance `r`, that counts in the family of node `i`.
     fn counted(&self, i: usize, j: usize, r: f64) -> f64 {
         let (a, b) = (&self.nodes[i], &self.nodes[j]);
         let between = a.is_wide != b.is_wide && self.meeting.families == Families::MultiHorizon;
@@ -218,7 +218,7 @@ impl<const D: usize> Strip<D> {
         lambda - mu
     }
 
-    /// How far from the change bonds are looked at: families of families.
+    /// Returns the distance from the change within which bonds are examined: families of families.
     fn zone(&self) -> f64 {
         2.0 * self.horizon(true)
     }
@@ -377,7 +377,7 @@ impl<const D: usize> Strip<D> {
         Some(())
     }
 
-    /// What a bond adds to the conditions of the dilatations.
+    /// Returns the contribution of a bond to the conditions of the dilatations.
     fn of_state(
         &self,
         i: usize,

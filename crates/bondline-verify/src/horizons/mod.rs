@@ -6,7 +6,7 @@
 //! |---|---|
 //! | `bar.rs` | a bar of two lattices between walls that mirror, and waves in it |
 //! | `variants.rs` | the ways |
-//! | `plane.rs` | 2:1 and 4:1 lattices in a plane: whether paired bonds can balance every node |
+//! | `plane.rs` | 2:1 and 4:1 lattices in a plane, and a test if paired bonds can balance every node |
 //! | `lattices.rs` | state-based laws on two lattices in two and three dimensions, and waves through the change |
 //!
 //! In one dimension a node is balanced under a uniform strain if and only if the tensions of all bonds over every cut between two nodes add up to the
@@ -33,7 +33,7 @@ use variants::{LEAST, Uniform, Variant};
 /// Forces and sums that must vanish may be this large.
 const ROUND_OFF: f64 = 1e-11;
 
-/// What came of a variant.
+/// Results of a variant.
 #[derive(Clone, Debug)]
 struct Found {
     variant: Variant,
@@ -108,7 +108,7 @@ fn planes(effort: Effort, progress: &dyn Progress) -> [Table; 2] {
     [plates, state_based(effort)]
 }
 
-/// Bars of one lattice by a law, and what waves do in them.
+/// Bars of one lattice by a law, and waves in them.
 struct Pure {
     fine: Bar,
     coarse: Bar,
@@ -135,9 +135,9 @@ impl Pure {
     }
 }
 
-/// How many times as narrow as the paper's the pulses are that are sent onto a change.
+/// Factors by which the pulses that are sent onto a change are narrower than the paper's.
 const NARROW: [f64; 2] = [1.0, 2.0];
-/// Where they start, and the change that they meet: from the middle to the right, and from the left end to the right.
+/// Start of the pulses, and the change that they meet: from the middle to the right, and from the left end to the right.
 const WAYS: [[f64; 2]; 2] = [[0.5 * LENGTH, CHANGES[1]], [10.0, CHANGES[0]]];
 
 /// Velocities each time the wave is back.

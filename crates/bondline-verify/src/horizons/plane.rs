@@ -1,4 +1,4 @@
-//! The same question in a plane: a strip of two square lattices, and whether bonds that are pairs can balance every node under every uniform strain.
+//! The same question in a plane: a strip of two square lattices, and a test if bonds that are pairs can balance every node under every uniform strain.
 //!
 //! The strip is periodic along the line at which the spacing changes. A bond between two nodes has the force `k ξ (ξ·η)`; under `η = G ξ` a node is balanced
 //! for every `G` if and only if `Σ k ξ⊗ξ⊗ξ = 0` over its bonds. These are four conditions per node, linear in the bonds, which belong to two nodes each.
@@ -18,7 +18,7 @@ struct Node {
     at: [f64; 2],
     area: f64,
     wide: bool,
-    /// Whether its whole family is in the strip.
+    /// True if its whole family is in the strip.
     whole: bool,
 }
 
@@ -29,16 +29,16 @@ struct PlaneBond {
     stiffness: f64,
 }
 
-/// How the bonds between the lattices are made.
+/// Construction of the bonds between the lattices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Between {
-    /// The mean of what both ends say.
+    /// The mean of the bonds of both ends.
     DualHorizon,
     /// The horizon of the coarse node, times the factor of each fine node with which the stress across the line is right.
     MultiHorizon,
 }
 
-/// What least change of the bonds balances every node.
+/// Least change of the bonds that balances every node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Balanced {
     /// Conditions.
@@ -232,7 +232,7 @@ impl Strip {
     }
 }
 
-/// What a bond adds to a third moment of a node, either end counted.
+/// Returns the contribution of a bond to a third moment of a node, either end counted.
 fn pull(b: &PlaneBond, n: usize, moment: [i32; 2]) -> f64 {
     let value = b.stiffness * b.xi[0].powi(moment[0]) * b.xi[1].powi(moment[1]);
     let mut sum = 0.0;

@@ -110,7 +110,7 @@ impl Variant {
         }
     }
 
-    /// Whether a uniform strain must leave no force.
+    /// Returns true if a uniform strain must leave no force.
     pub fn is_patch_exact(self) -> bool {
         matches!(
             self,
@@ -122,7 +122,7 @@ impl Variant {
         )
     }
 
-    /// Whether forces must be pairs.
+    /// Returns true if forces must be pairs.
     pub fn is_reciprocal(self) -> bool {
         !matches!(self, Self::SourceNode | Self::Splice | Self::PartialStress)
     }

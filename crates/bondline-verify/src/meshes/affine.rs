@@ -32,7 +32,7 @@ struct Family {
     size: f64,
     /// The zone: lowest and highest corner.
     zone: [[f64; 3]; 2],
-    /// Where displacements are prescribed.
+    /// Part of the boundary on which displacements are prescribed.
     boundary: &'static str,
     /// Width of the transition zone.
     around: f64,

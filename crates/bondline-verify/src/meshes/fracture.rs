@@ -16,7 +16,7 @@ use bondline::{
     progress::Progress,
 };
 
-/// Largest relative difference of what a plane takes from the fracture energy.
+/// Largest relative difference of the energy that a plane takes from the fracture energy.
 pub const PLANE_LIMIT: f64 = 0.02;
 
 /// Largest energy that nothing accounts for, over the work, at a tenth of the stable step.

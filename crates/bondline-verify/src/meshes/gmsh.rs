@@ -1,4 +1,4 @@
-//! Meshes as Gmsh 2.2 text: what a scene reads where its own generators do not make them.
+//! Meshes as Gmsh 2.2 text: those that a scene's own generators do not make.
 
 use std::fmt::Write as _;
 
@@ -67,7 +67,7 @@ pub fn with_sets<const D: usize>(mesh: &Mesh<D>) -> String {
 /// A file with its cells raised to second order, each new node in the middle of its edge, then moved by `place`.
 ///
 /// # Errors
-/// What reading it says.
+/// The message of the reader.
 pub fn raised<const D: usize>(
     mesh: &str,
     place: impl Fn(&mut Vector<D>),

@@ -7,7 +7,7 @@
 //! | `affine.rs` | affine fields on eight families of meshes |
 //! | `fracture.rs` | planes pulled apart, balance of energy of bodies that break |
 //! | `order.rs` | orders of convergence to exact solutions beside every coupling |
-//! | `scene.rs` | a scene as text, run in a folder of its own, and what it summed up; or its model alone |
+//! | `scene.rs` | a scene as text, run in a folder of its own, and its summary; or its model alone |
 //! | `gmsh.rs` | meshes as Gmsh text |
 //!
 //! A row passes, or the scene is refused with its reason, and both are counted. Nothing here builds a model by another way than a scene does.

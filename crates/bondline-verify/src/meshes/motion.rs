@@ -1,4 +1,4 @@
-//! Motion of scenes as they are typed: what the proof says of growing modes beside what then happened, and the discrete energy over long runs.
+//! Motion of scenes as they are typed: the growing modes of the proof beside the growth in the run, and the discrete energy over long runs.
 
 use super::scene::{history, run};
 use crate::Effort;
@@ -117,7 +117,7 @@ fn figure(summary: &RunSummary, name: &str) -> f64 {
     found.map_or(0.0, |figure| figure.value)
 }
 
-/// What the proof says, what happened, and what becomes of the scene at the defaults.
+/// Adds the growth by the proof, that in the run, and the outcome of the scene at the defaults.
 fn rows(case: &Case, table: &mut Table) {
     let let_go = [
         case.overrides,

@@ -26,7 +26,7 @@ pub const ORDER_LIMIT: f64 = 1.8;
 /// The same in space, unless the error is at most that of elements alone.
 pub const ORDER_LIMIT_3D: f64 = 1.5;
 
-/// How much an error on the second mesh may exceed that of elements alone.
+/// Largest excess of an error on the second mesh over that of elements alone.
 pub const BEYOND_LIMIT: f64 = 0.02;
 
 /// A displacement field, all of three components.
@@ -199,7 +199,7 @@ fn file(text: String) -> (String, Option<String>) {
 
 const MESH_FILE: &str = "mesh.msh";
 
-/// How far a polar mesh goes round.
+/// Angle that a polar mesh covers.
 #[derive(Clone, Copy, PartialEq)]
 enum Turn {
     Quarter,
@@ -342,7 +342,7 @@ struct Method {
     has_transition: bool,
     /// Points per element along an edge in the plane: elements that carry the partial stress of points between their nodes have to be wider than one spacing, and faces that bonds end on have to be two spacings wide.
     finer: usize,
-    /// Why it is left out in space.
+    /// Reason why it is left out in space.
     dear: Option<&'static str>,
 }
 

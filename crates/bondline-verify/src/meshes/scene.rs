@@ -1,4 +1,4 @@
-//! A scene as text, run in a folder of its own, and what it summed up; or its model alone.
+//! A scene as text, run in a folder of its own, and its summary; or its model alone.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -19,7 +19,7 @@ impl Folder {
     /// A new folder among the system's temporary files, holding `files` (name, text).
     ///
     /// # Errors
-    /// What the system says, as text.
+    /// The message of the operating system.
     pub fn with(files: &[(&str, &str)]) -> Result<Self, String> {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
@@ -32,7 +32,7 @@ impl Folder {
         Ok(folder)
     }
 
-    /// Where it is.
+    /// Returns its path.
     pub fn path(&self) -> &Path {
         &self.0
     }
@@ -111,7 +111,7 @@ pub fn files(text: &str, names: &[&str]) -> Result<Vec<Option<String>>, String> 
     Ok(names.iter().map(read).collect())
 }
 
-/// What `check` says of a scene, without its error prediction.
+/// Returns the prediction of `check` for a scene, without that of the error.
 ///
 /// # Errors
 /// The message of a refusal.
@@ -142,7 +142,7 @@ pub fn samples(text: &str, places: &mut Vec<[f64; 3]>) -> Result<Samples, String
     scene.samples(places, &Silent).map_err(|e| e.to_string())
 }
 
-/// Why a scene has no model.
+/// Failure to make the model of a scene.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneFailure {
     /// The scene is refused.
@@ -154,7 +154,7 @@ pub enum SceneFailure {
 }
 
 impl SceneFailure {
-    /// Whether the seam of truncated bonds cannot be fitted.
+    /// Returns true if the seam of truncated bonds cannot be fitted.
     pub fn is_seam(&self) -> bool {
         matches!(
             self,

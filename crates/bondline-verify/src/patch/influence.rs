@@ -1,4 +1,4 @@
-//! Which influence functions leave a coupled bar well posed: the spectrum of its stiffness per volume, and its solution.
+//! Influence functions that leave a coupled bar well posed: the spectrum of its stiffness per volume, and its solution.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;

@@ -88,7 +88,7 @@ fn key(x: &Vector<2>) -> [i64; 2] {
 
 const ALONE: &str = "\"nonlocal\"";
 
-/// Whether a site is within so many horizons of the outer boundary.
+/// Returns true if a site is within so many horizons of the outer boundary.
 fn is_band(e: &Enclosed<2>, x: &Vector<2>, horizons: u32) -> bool {
     x.amax() > e.half - (f64::from(horizons * RATIO) - 0.25) * SPACING
 }
@@ -163,11 +163,11 @@ fn at_rest(method: Method, material: Material) -> Result<[f64; 2], String> {
     ])
 }
 
-/// What became of a crack that was let run.
+/// Results of the run of a crack.
 struct Run {
     /// Energy that it took, over that which was stored.
     taken: f64,
-    /// By how much it is longer, in spacings, seen from the points above it and below it.
+    /// Growth of its length, in spacings, seen from the points above it and below it.
     longer: [f64; 2],
     /// Largest distance from the middle, in spacings, of a point beside it that has lost half, or 85 %, of its bonds across.
     tip: [f64; 2],
@@ -176,7 +176,7 @@ struct Run {
     missing: f64,
 }
 
-/// Which bonds may break.
+/// Bonds that may break.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Breaks {
     All,
@@ -191,7 +191,7 @@ fn damage_beside(x: &[Vector<2>], y: f64, damage: &[f64], side: f64) -> Vec<(f64
     beside.map(|(x, d)| (x[0], *d)).collect()
 }
 
-/// How far from the middle, in spacings, points have lost a `part` of the bonds that a crack cuts.
+/// Returns the largest distance from the middle, in spacings, of points that have lost a `part` of the bonds that a crack cuts.
 fn tip_of(x: &[Vector<2>], y: f64, damage: &[f64], part: f64) -> f64 {
     let both = [0.5, -0.5].map(|side| damage_beside(x, y, damage, side));
     let lost = both.iter().flatten().filter(|(_, d)| *d >= part * CUT);
@@ -334,7 +334,7 @@ fn running(table: &mut Table) {
     found.into_iter().flatten().for_each(|row| table.push(row));
 }
 
-/// Where a plane wave comes from.
+/// Direction from which a plane wave meets the zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Meets {
     Face,
@@ -349,7 +349,7 @@ impl Meets {
         }
     }
 
-    /// How far the zone reaches against the wave.
+    /// Returns the extent of the zone against the wave.
     fn reach(self, zone: f64) -> f64 {
         match self {
             Self::Face => zone,

@@ -175,7 +175,7 @@ fn build<const D: usize>(case: &Case) -> Result<Enclosed<D>, EnclosedError> {
     Ok(Enclosed::of_scene(&text, &files(&file), half)?)
 }
 
-/// What stands in the way of a seam that does not follow the lattice, and whether it could be fitted.
+/// Lists the conditions of a seam that does not follow the lattice, and the residual of its fit.
 fn obstruction<const D: usize>(grain: Grain, ratio: u32) -> Vec<TableRow> {
     let case = Case {
         form: Form::Block,

@@ -19,7 +19,7 @@ const STRAIN: f64 = 1e-3;
 /// Change of the opening between two grids, relative to it, at which it has settled.
 const SETTLED: f64 = 0.01;
 
-/// What a grid gives.
+/// Results of a grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Stage {
     sites: usize,

@@ -8,7 +8,7 @@
 //! | `plate` | the cells, their levels, and the body that they make |
 //! | `transfer` | fields from one set of sites to another |
 //! | `crack` | statics: lattices nested about a crack until its opening settles |
-//! | `ring` | a wave that runs outwards in a ring: its exact solution, what following it costs and keeps |
+//! | `ring` | a wave that runs outwards in a ring: its exact solution, cost and conservation of a grid that follows it |
 
 pub mod crack;
 pub mod plate;

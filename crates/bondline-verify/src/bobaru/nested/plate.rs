@@ -12,7 +12,7 @@ use bondline::{
     tensor::Vector,
 };
 
-/// What all grids of a plate have in common.
+/// Parameters that all grids of a plate have in common.
 ///
 /// Density and `C_1111` are 1, and Poisson's ratio that of bonds, so that a wave of pressure has the speed 1.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,7 +65,7 @@ impl Plate {
         range(cell / n).flat_map(move |j| range(cell % n).map(move |i| self.index([i, j])))
     }
 
-    /// Whether a cell is an element: it touches one of a finer level.
+    /// Returns true if a cell is an element: it touches one of a finer level.
     pub fn is_layer(&self, levels: &[u8], cell: usize) -> bool {
         self.around(cell).any(|c| levels[c] > levels[cell])
     }
@@ -96,7 +96,7 @@ impl Plate {
     /// The body of cells of these levels, from a scene: levels and the layers between them are drawn by sets of cells.
     ///
     /// # Errors
-    /// Why the scene or its model is refused, as text.
+    /// The reason why the scene or its model is refused, as text.
     pub fn body(&self, levels: &[u8]) -> Result<Body, String> {
         let half = self.half as f64;
         // a level whose cells are all elements has no lattice

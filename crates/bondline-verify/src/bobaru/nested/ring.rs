@@ -92,7 +92,7 @@ fn initial(positions: &[Vector<2>]) -> Vec<f64> {
         .collect()
 }
 
-/// What is refined, when, and how long it moves.
+/// Parameters of the refinement, and the duration of the motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// The plate.
@@ -126,7 +126,7 @@ impl Following {
     /// The plate at rest with the displacement of the ring; the first grid follows its energy.
     ///
     /// # Errors
-    /// Why a grid makes no body, as text.
+    /// The reason why a grid makes no body, as text.
     pub fn new(plan: Plan) -> Result<Self, String> {
         let levels = vec![0; plan.plate.cells().pow(2)];
         let mut plate = Self {
@@ -198,7 +198,7 @@ impl Following {
     /// Lets the plate move to the end; `look` sees it after every leg.
     ///
     /// # Errors
-    /// Why a grid makes no body or a motion no step, as text.
+    /// The reason why a grid makes no body or a motion no step, as text.
     pub fn run(&mut self, look: &mut dyn FnMut(&Self)) -> Result<(), String> {
         let mut done = 0;
         while done < self.plan.steps {
