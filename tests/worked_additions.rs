@@ -268,6 +268,13 @@ fn the_additions_of_the_page_build_and_run() {
     let mean = &line["mean_stress"];
     assert!(mean.iter().all(|m| (m - 10.0).abs() < 1e-7), "{mean:?}");
 
+    run("bond_energy.toml", &[]);
+    let history = table(&copied.join("out/bond_energy_history.csv"));
+    let broken = history["time"].iter().zip(&history["broken_bonds"]);
+    let first = broken.clone().find(|(_, broken)| **broken > 0.0);
+    let time = *first.expect("no bond broke").0;
+    assert!((time - 2.0).abs() < 0.06, "{time}");
+
     run("dashpot.toml", &[]);
     let history = table(&copied.join("out/dashpot_history.csv"));
     let [first, last] = ["stored_energy", "dissipated_energy"].map(|name| &history[name]);

@@ -29,7 +29,7 @@ use crate::{
 };
 use behaviour::NONE;
 pub use behaviour::{
-    BondBehaviour, ContactBehaviour, FailureCriterion, FreeStretch, StretchOfMaterials, SystemError,
+    BondBehaviour, BondThreshold, ContactBehaviour, FreeStretch, StretchOfMaterials, SystemError,
 };
 pub use rows::scale_rows;
 
@@ -121,8 +121,8 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         let is_linear = behaviour.failure.is_none()
             && behaviour.kinematics == BondKinematics::Linear
             && law.is_none_or(|law| law.is_linear());
-        // the pieces of bonds that a seam cuts follow the laws that have accelerators; of any other they stay linear, and where they expand
-        let follows = behaviour.heat.is_none()
+        // the pieces of bonds that a seam cuts follow the laws that have accelerators; of any other they stay linear, as where they expand or a state breaks bonds
+        let follows = behaviour.suits_accelerators()
             && (model.peridynamics.as_ref()).is_some_and(|p| p.accelerator().is_some());
         let of_seam = (!is_linear && follows).then(|| operator.seam_bonds());
         let (mut seam, add_rest) = match of_seam.flatten() {

@@ -22,7 +22,7 @@
 //! | `critical_stretch.rs` | critical stretch from the fracture energy | \[Silling2005\] |
 //! | `softening.rs` | softening of bonds from strength and fracture energy | \[BazantOh1983\] |
 //! | `zero_energy.rs` | what resists the zero-energy modes of correspondence | section 6.3 |
-//! | `tearing_parameter.rs` | failure of ductile materials | eq. (6.33) |
+//! | `failure/` | criteria by which bonds break, one file each | section 6.3, \[Silling2005\] |
 //! | `crack_area.rs` | area of cracks from broken bonds | |
 //! | `partial_volume/` | what share of a cell counts in a family whose horizon cuts it | section 5.2.1 |
 //! | `body.rs`, `body/` | the body: rows of the internal force, and partial stress | eq. (2.5), (2.19) |
@@ -41,6 +41,7 @@ pub mod contact;
 mod crack_area;
 pub mod critical_stretch;
 mod departure;
+pub mod failure;
 pub mod families;
 pub mod force_state;
 mod horizon;
@@ -57,7 +58,6 @@ pub mod position_aware_influence;
 pub mod shape_tensor;
 pub mod shell_weights;
 pub mod softening;
-mod tearing_parameter;
 pub mod zero_energy;
 
 pub(crate) use body::FamilyEnds;

@@ -5,14 +5,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::coupling::semidiscrete::behaviour::FailureCriterion;
+use crate::coupling::semidiscrete::behaviour::BondThreshold;
 use crate::coupling::{Model, Operator, SiteKind};
 use crate::observe::report::number;
 use crate::peridynamics::{Departure, largest_extension};
 use crate::run::error::RunError;
 use crate::run::motion::dynamic_system::failure_criterion;
 use crate::run::setup::RunSettings;
-use crate::scene::materials::Fracture;
 use crate::system::Ranks;
 use crate::tensor::{Tensor, Vector, inverse, padded, strain};
 use crate::{fem, parallel};
@@ -77,7 +76,7 @@ pub(crate) struct LinearParts<'m, const D: usize> {
     rows: Vec<u32>,
     /// Points whose bonds cannot break, where others can.
     whole: Vec<u32>,
-    critical: Option<FailureCriterion>,
+    critical: Option<BondThreshold>,
 }
 
 impl<'m, const D: usize> LinearParts<'m, D> {
@@ -178,19 +177,20 @@ impl<'m, const D: usize> LinearParts<'m, D> {
         let stuff = &self.rest.materials[usize::from(material)];
         if material == self.model.peridynamic_material() || self.model.several().is_some() {
             match &self.critical {
-                Some(FailureCriterion::ByMaterials(of)) => return of.at(material, material),
-                Some(FailureCriterion::PerLattice(list)) => {
+                Some(BondThreshold::ByMaterials(of)) => return of.at(material, material),
+                Some(BondThreshold::PerLattice(list)) => {
                     return list.iter().copied().fold(f64::INFINITY, f64::min);
                 }
-                Some(FailureCriterion::Uniform(s)) => return *s,
-                Some(FailureCriterion::Tearing(_)) | None => {}
+                Some(BondThreshold::Uniform(s)) => return *s,
+                Some(BondThreshold::State(_)) | None => {}
             }
         }
-        match stuff.fracture {
-            Some(Fracture::Stretch(s)) => s,
-            // without points there is no horizon that an energy would give a stretch with
-            Some(Fracture::Energy(_) | Fracture::Tearing(_)) | None => f64::INFINITY,
-        }
+        // without points there is no horizon that an energy would give a stretch with
+        let unknown = |_energy| Err(());
+        let typed = stuff
+            .fracture
+            .and_then(|f| f.stretch(unknown).ok().flatten());
+        typed.unwrap_or(f64::INFINITY)
     }
 
     /// Looks at a state for what is beyond its limit further than anything before. Collective where families are spread.

@@ -3,7 +3,6 @@
 use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
 use super::failure::Breaking;
-use super::materials::Fracture;
 use super::peridynamics::Peridynamics;
 use super::solve::Solve;
 use super::source::Span;
@@ -11,6 +10,7 @@ use super::spec::{CouplingSpec, CutBondsSpec, SceneSpec, SkinSpec, ZonesNeeded};
 use crate::mesh::Mesh;
 use crate::observe::report::number;
 use crate::peridynamics::Law;
+use crate::peridynamics::failure::Fracture;
 use crate::scene::points::Points;
 use crate::scene::selected_coupling::SelectedCoupling;
 

@@ -3,12 +3,13 @@
 use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
 use super::material_interfaces::MaterialInterface;
-use super::materials::{Fracture, Material};
+use super::materials::Material;
 use super::region::{Region, region};
 use super::spec::{
     BondsSpec, CalibrationSpec, ContactSpec, EdgeSpec, PrecisionSpec, SceneSpec, SolveSpec,
 };
 use crate::mesh::Mesh;
+use crate::peridynamics::failure::Fracture;
 
 /// Deformation and fracture of bonds, and contact. A scene that names neither fracture nor contact has none, and pays for none.
 #[derive(Clone, Debug, PartialEq)]
@@ -169,7 +170,7 @@ pub(crate) fn breaking<const D: usize>(
         .peridynamics
         .as_ref()
         .and_then(|p| p.calibration.as_ref());
-    let has_energy = |fracture: Option<Fracture>| matches!(fracture, Some(Fracture::Energy(_)));
+    let has_energy = |fracture: Option<Fracture>| fracture.is_some_and(|f| f.energy().is_some());
     let has_energy = has_energy(fracture)
         || used.len() > 1
             && (used

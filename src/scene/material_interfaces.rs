@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
-use super::materials::{Fracture, Material};
+use super::materials::Material;
 use super::peridynamics::Peridynamics;
 use super::source::Span;
 use super::spec::{CouplingSpec, MaterialInterfaceSpec, SceneSpec, StiffnessSpec};
 use super::value::Text;
 use crate::coupling::Zone;
 use crate::observe::summary::Decision;
+use crate::peridynamics::failure::{self, Fracture};
 use crate::peridynamics::{Law, Several, StiffnessMean};
 use crate::scene::points::Points;
 
@@ -161,12 +162,15 @@ fn fracture<const D: usize>(
                     "give critical-stretch instead",
                 );
             }
-            Fracture::Energy(bounds_checks::positive(&place("fracture-energy"), energy)?)
+            Fracture {
+                criterion: failure::FRACTURE_ENERGY,
+                value: bounds_checks::positive(&place("fracture-energy"), energy)?,
+            }
         }
-        (None, Some(stretch)) => Fracture::Stretch(bounds_checks::positive(
-            &place("critical-stretch"),
-            stretch,
-        )?),
+        (None, Some(stretch)) => Fracture {
+            criterion: failure::CRITICAL_STRETCH,
+            value: bounds_checks::positive(&place("critical-stretch"), stretch)?,
+        },
     };
     if !law.has_breakable_bonds() {
         return refused(
@@ -384,8 +388,8 @@ pub(crate) fn check<const D: usize>(
     let tears = |m: &&u16| of(**m).fracture.is_some_and(|f| !f.is_of_stretch());
     if used.iter().find(tears).is_some() {
         return Err(pair.refused(
-            "one breaks by a tearing parameter",
-            "another, and the parameter is a mean over bonds of one",
+            "one breaks by the state of its points",
+            "another, and what crosses their border has no such criterion",
             "give critical-stretch to both",
         ));
     }

@@ -8,15 +8,14 @@ use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind};
 use super::peridynamics;
 use super::region::region;
-use super::spec::{CellsSpec, FractureKey, Given, MaterialSpec, MicromodulusSpec, ShapeSpec};
+use super::spec::{CellsSpec, Given, MaterialSpec, MicromodulusSpec, ShapeSpec};
 use super::user_material;
 use super::value::Text;
 use crate::material::{Elastic, Kinematics};
 use crate::mesh::Mesh;
+use crate::peridynamics::failure::Fracture;
 use crate::peridynamics::laws::{Constants, Parameter};
-use crate::peridynamics::{
-    BondBased, Correspondence, Influence, Law, LinearPeridynamicSolid, Micromodulus,
-};
+use crate::peridynamics::{Influence, Law, Micromodulus};
 use crate::tensor::Tensor4;
 
 /// The Poisson ratio of a material, and that at which its bonds would act alone.
@@ -57,27 +56,6 @@ pub struct Material<const D: usize> {
     pub fracture: Option<Fracture>,
     /// Linear thermal expansion per degree; none if not given.
     pub expansion: Option<f64>,
-}
-
-/// Fracture criterion of a bond.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Fracture {
-    /// At the stretch at which a new crack takes this energy per area \[J/m²\].
-    Energy(f64),
-    /// At this stretch.
-    Stretch(f64),
-    /// At this tearing parameter.
-    Tearing(f64),
-}
-
-impl Fracture {
-    /// Returns true if a stretch breaks the bond, typed or calibrated to an energy.
-    pub fn is_of_stretch(self) -> bool {
-        match self {
-            Self::Energy(_) | Self::Stretch(_) => true,
-            Self::Tearing(_) => false,
-        }
-    }
 }
 
 impl<const D: usize> Material<D> {
@@ -200,43 +178,29 @@ fn law_and_cells<'a, const D: usize>(
     ((lambda, mu), density): ((f64, f64), f64),
     directory: &Path,
 ) -> Result<(Arc<dyn Law<D>>, Option<&'a CellsSpec>), SceneError> {
+    let micromodulus = match spec {
+        MaterialSpec::Named(m) => m.micromodulus.as_ref(),
+        MaterialSpec::Umat(_) => None,
+    };
     let constants = Constants {
         lambda,
         shear: mu,
         influence,
+        micromodulus: match micromodulus {
+            None | Some(MicromodulusSpec::InverseDistance) => Micromodulus::InverseDistance,
+            Some(MicromodulusSpec::Constant) => Micromodulus::Constant,
+            Some(MicromodulusSpec::Uniform) => Micromodulus::Uniform,
+            Some(MicromodulusSpec::Triangular) => Micromodulus::Triangular,
+            Some(MicromodulusSpec::Influence(i)) => {
+                let place = format!("materials.{name}.bond-based.micromodulus.influence");
+                Micromodulus::Influence(peridynamics::influence(&place, i)?)
+            }
+        },
         kinematics,
         density,
         is_heated: spec.thermal_expansion().is_some(),
     };
     Ok(match spec {
-        MaterialSpec::BondBased(m) => {
-            let micromodulus = match &m.micromodulus {
-                MicromodulusSpec::InverseDistance => Micromodulus::InverseDistance,
-                MicromodulusSpec::Constant => Micromodulus::Constant,
-                MicromodulusSpec::Uniform => Micromodulus::Uniform,
-                MicromodulusSpec::Triangular => Micromodulus::Triangular,
-                MicromodulusSpec::Influence(i) => {
-                    let place = format!("materials.{name}.bond-based.micromodulus.influence");
-                    Micromodulus::Influence(peridynamics::influence(&place, i)?)
-                }
-            };
-            (Arc::new(BondBased::new(micromodulus, mu)), m.cells.as_ref())
-        }
-        MaterialSpec::Lps(m) => (
-            Arc::new(LinearPeridynamicSolid::new(influence, lambda, mu)),
-            m.cells.as_ref(),
-        ),
-        MaterialSpec::Correspondence(m) => {
-            let place = format!("materials.{name}.correspondence.stabilisation");
-            let stabilisation = match &m.stabilisation {
-                Some(s) => bounds_checks::not_negative(&place, s)?,
-                None => 1.0,
-            };
-            (
-                Arc::new(Correspondence::new(influence, lambda, mu, stabilisation)),
-                m.cells.as_ref(),
-            )
-        }
         MaterialSpec::Umat(m) => (
             user_material::umat(name, m, constants, directory)?,
             m.cells.as_ref(),
@@ -326,12 +290,9 @@ fn place_of_word(
 }
 
 fn fracture(name: &Text, spec: &MaterialSpec) -> Result<Option<Fracture>, SceneError> {
-    let Some(fracture) = spec.fracture() else {
-        return Ok(None);
-    };
-    let law = fracture.law;
-    let mut typed = (fracture.typed.into_iter()).filter_map(|(key, n)| n.map(|n| (key, n)));
-    let Some((key, number)) = typed.next() else {
+    let law = spec.law();
+    let mut typed = spec.failure().into_iter();
+    let Some((criterion, number)) = typed.next() else {
         return Ok(None);
     };
     if let Some((other, second)) = typed.next() {
@@ -339,7 +300,7 @@ fn fracture(name: &Text, spec: &MaterialSpec) -> Result<Option<Fracture>, SceneE
             SceneErrorKind::Choice,
             format!(
                 "`materials.{name}.{law}` holds `{}`, `{}` at once",
-                key.key(),
+                criterion.key(),
                 other.key()
             ),
         )
@@ -347,13 +308,9 @@ fn fracture(name: &Text, spec: &MaterialSpec) -> Result<Option<Fracture>, SceneE
         .label(second.span.clone(), "and another")
         .help("keep one of them: bonds break by one criterion"));
     }
-    let place = format!("materials.{name}.{law}.{}", key.key());
+    let place = format!("materials.{name}.{law}.{}", criterion.key());
     let value = bounds_checks::positive(&place, number)?;
-    Ok(Some(match key {
-        FractureKey::Energy => Fracture::Energy(value),
-        FractureKey::Stretch => Fracture::Stretch(value),
-        FractureKey::Tearing => Fracture::Tearing(value),
-    }))
+    Ok(Some(Fracture { criterion, value }))
 }
 
 /// The largest modulus, whose square times those of lengths still is a number.
@@ -365,14 +322,6 @@ fn constants<const D: usize>(
     kinematics: Kinematics,
 ) -> Result<((f64, f64), f64), SceneError> {
     let (kind, modulus, ratio, density) = match spec {
-        MaterialSpec::BondBased(m) => ("bond-based", &m.youngs_modulus, None, &m.density),
-        MaterialSpec::Lps(m) => ("lps", &m.youngs_modulus, Some(&m.poisson_ratio), &m.density),
-        MaterialSpec::Correspondence(m) => (
-            "correspondence",
-            &m.youngs_modulus,
-            Some(&m.poisson_ratio),
-            &m.density,
-        ),
         MaterialSpec::Umat(m) => (
             "umat",
             &m.youngs_modulus,

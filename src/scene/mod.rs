@@ -72,6 +72,7 @@ pub(crate) mod validated;
 pub(crate) mod value;
 pub(crate) mod zones;
 
+pub use crate::peridynamics::failure::Fracture;
 pub use crate::scene::points::Points;
 pub use adaptive_zone::Follow;
 pub use conditions::{Components, Condition, Field, Prescribed, Support};
@@ -82,7 +83,7 @@ pub use function::Function;
 pub use impactors::{Impactor, ImpactorMotion};
 pub use initial::{Initial, InitialKind};
 pub use load::{Density, Domain, Load};
-pub use materials::{Fracture, Material};
+pub use materials::Material;
 pub use peridynamics::Peridynamics;
 pub use region::Region;
 pub use section::Section;

@@ -178,7 +178,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::coupling::semidiscrete::behaviour::{BondBehaviour, FailureCriterion};
+    use crate::coupling::semidiscrete::behaviour::{BondBehaviour, BondThreshold};
     use crate::coupling::{CoupledSystem, Sampler};
     use crate::peridynamics::bond_force::BondKinematics;
     use crate::progress::Silent;
@@ -423,7 +423,7 @@ y = 0.01
                 let model = solved.model;
                 let behaviour = BondBehaviour {
                     kinematics,
-                    failure: Some(FailureCriterion::Uniform(1.0)),
+                    failure: Some(BondThreshold::Uniform(1.0)),
                     no_fail: &|_| false,
                     contact: None,
                     storage: crate::peridynamics::bond_force::Storage::Double,

@@ -62,11 +62,9 @@ const TRANSITIONS: &[&str] = &[
     "set",
     "without",
 ];
-/// Keys of materials: those with keys of their own kind, and the laws that are known by name.
-static MATERIALS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
-    let typed = ["bond-based", "correspondence", "lps", "umat"];
-    typed.iter().chain(Named::KEYS).copied().collect()
-});
+/// Keys of materials: the laws, and routines of users.
+static MATERIALS: LazyLock<Vec<&'static str>> =
+    LazyLock::new(|| Named::KEYS.iter().copied().chain(["umat"]).collect());
 const AXES: &[&str] = &["cells", "graded", "spacing"];
 const MESHES: &[&str] = &["box", "file", "line", "rectangle"];
 const SOLVES: &[&str] = &["explicit", "quasi-static", "static"];

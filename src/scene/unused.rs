@@ -98,11 +98,10 @@ impl<const D: usize> Parts<'_, D> {
     fn without_points(&self) -> Vec<String> {
         let mut list = Vec::new();
         for (name, material) in &self.spec.materials {
-            let mut typed = material.fracture().into_iter().flat_map(|f| f.typed);
-            if let Some((key, _)) = typed.find(|(_, number)| number.is_some()) {
+            if let Some((criterion, _)) = material.failure().first() {
                 list.push(format!(
                     "`{}` of the material `{name}` is not used: the body is all finite elements, and they do not break",
-                    key.key()
+                    criterion.key()
                 ));
             }
         }

@@ -1,7 +1,7 @@
 //! A moving model against the assembled one, closed forms and momentum.
 
 use bondline::coupling::SiteKind;
-use bondline::coupling::semidiscrete::{BondBehaviour, FailureCriterion};
+use bondline::coupling::semidiscrete::{BondBehaviour, BondThreshold};
 use bondline::coupling::semidiscrete::{CoupledSystem, masses, scale_rows};
 use bondline::fem;
 use bondline::peridynamics::bond_force::BondKinematics;
@@ -21,7 +21,7 @@ fn behaviour<const D: usize>(
 ) -> BondBehaviour<'static, D> {
     BondBehaviour {
         kinematics,
-        failure: critical_stretch.map(FailureCriterion::Uniform),
+        failure: critical_stretch.map(BondThreshold::Uniform),
         no_fail: &|_| false,
         contact: None,
         storage: bondline::peridynamics::bond_force::Storage::Double,

@@ -1,7 +1,7 @@
 //! Bonds at a truncated seam that turn, stretch and break: gradients, energies, a crack beside the seam.
 
 use super::{
-    BondBehaviour, CoupledSystem, DENSITY, FailureCriterion, behaviour, case, largest, wave,
+    BondBehaviour, BondThreshold, CoupledSystem, DENSITY, behaviour, case, largest, wave,
     with_motion, with_motion_by,
 };
 use bondline::system::BodyState;
@@ -279,7 +279,7 @@ fn bodies_of_different_horizons_break_at_their_own_stretch() {
         let e = layers::bodies::<2>(law, 2).unwrap();
         let operator = e.coupling.operator(&e.model).unwrap();
         let behaviour = BondBehaviour {
-            failure: Some(FailureCriterion::PerLattice(vec![0.01, 0.015])),
+            failure: Some(BondThreshold::PerLattice(vec![0.01, 0.015])),
             ..behaviour(BondKinematics::Exact, None)
         };
         let density = |_| DENSITY;
@@ -369,7 +369,7 @@ fn crack_beside_the_seam(coupling: &str) -> Run {
     let outside = |x: &Vector<2>| x.amax() > 0.1;
     let behaviour = BondBehaviour {
         kinematics: BondKinematics::Exact,
-        failure: Some(FailureCriterion::Uniform(critical)),
+        failure: Some(BondThreshold::Uniform(critical)),
         no_fail: &outside,
         contact: None,
         storage: bondline::peridynamics::bond_force::Storage::Double,

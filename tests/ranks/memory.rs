@@ -5,7 +5,7 @@ use bondline::system::BodyState;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use bondline::coupling::semidiscrete::{BondBehaviour, CoupledSystem, FailureCriterion};
+use bondline::coupling::semidiscrete::{BondBehaviour, BondThreshold, CoupledSystem};
 use bondline::coupling::{Model, Operator};
 use bondline::peridynamics::bond_force::{BondKinematics, Storage};
 use bondline::progress::Silent;
@@ -125,7 +125,7 @@ fn lay_out<T>(
         |_| 1.0,
         &BondBehaviour {
             kinematics: BondKinematics::Exact,
-            failure: Some(FailureCriterion::Uniform(0.1)),
+            failure: Some(BondThreshold::Uniform(0.1)),
             no_fail: &|_| false,
             contact: None,
             storage: Storage::Double,

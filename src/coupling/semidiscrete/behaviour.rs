@@ -9,6 +9,7 @@ use crate::{
     peridynamics::{
         bond_force::{BondKinematics, KernelError, Storage},
         contact::ContactError,
+        failure::StateCriterion,
     },
     tensor::Vector,
 };
@@ -23,7 +24,7 @@ pub struct BondBehaviour<'a, const D: usize> {
     /// Whether bonds turn with the body, or are linear in the displacement.
     pub kinematics: BondKinematics,
     /// What breaks bonds; none if nothing does.
-    pub failure: Option<FailureCriterion>,
+    pub failure: Option<BondThreshold>,
     /// Where bonds never break.
     pub no_fail: &'a (dyn Fn(&Vector<D>) -> bool + Sync),
     /// Contact of points that no bond joins; none if they may pass through each other.
@@ -34,6 +35,13 @@ pub struct BondBehaviour<'a, const D: usize> {
     pub heat: Option<FreeStretch<D>>,
     /// Bonds that are broken from the start, in a motion that goes on from another layout.
     pub broken: Option<&'a BrokenBonds<D>>,
+}
+
+impl<const D: usize> BondBehaviour<'_, D> {
+    /// Returns true if accelerators of laws know all of it: neither a temperature nor a criterion of a state.
+    pub(super) fn suits_accelerators(&self) -> bool {
+        self.heat.is_none() && !matches!(self.failure, Some(BondThreshold::State(_)))
+    }
 }
 
 /// A number of a position, a material and a time.
@@ -56,17 +64,17 @@ pub struct FreeStretch<const D: usize> {
     pub varies_in_time: bool,
 }
 
-/// What breaks bonds: a stretch, or a tearing parameter.
-#[derive(Clone, Debug, PartialEq)]
-pub enum FailureCriterion {
+/// Threshold at which bonds break: a stretch, or a state.
+#[derive(Clone, Debug)]
+pub enum BondThreshold {
     /// The same everywhere.
     Uniform(f64),
     /// One for each lattice of the model: the same fracture energy takes a larger stretch where the horizon is smaller.
     PerLattice(Vec<f64>),
     /// One for each pair of materials.
     ByMaterials(StretchOfMaterials),
-    /// No stretch, but this tearing parameter.
-    Tearing(f64),
+    /// No stretch, but a state of points and bonds.
+    State(Arc<dyn StateCriterion>),
 }
 
 /// The stretch that breaks bonds of each pair of materials.
@@ -96,14 +104,14 @@ impl StretchOfMaterials {
     }
 }
 
-impl FailureCriterion {
+impl BondThreshold {
     /// The stretch that breaks a bond of a lattice between two materials; infinite where none does.
     pub fn at(&self, lattice: usize, [a, b]: [u16; 2]) -> f64 {
         match self {
             Self::Uniform(s) => *s,
             Self::PerLattice(list) => list.get(lattice).copied().unwrap_or(f64::INFINITY),
             Self::ByMaterials(stretch) => stretch.at(a, b),
-            Self::Tearing(_) => f64::INFINITY,
+            Self::State(_) => f64::INFINITY,
         }
     }
 
@@ -112,7 +120,7 @@ impl FailureCriterion {
         match self {
             Self::Uniform(s) => Some(*s),
             Self::PerLattice(list) => list.first().copied(),
-            Self::ByMaterials(_) | Self::Tearing(_) => None,
+            Self::ByMaterials(_) | Self::State(_) => None,
         }
     }
 }

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::heat::PointHeat;
 use super::split::Split;
 use crate::coupling::semidiscrete::behaviour::{
-    BondBehaviour, CHUNK, FailureCriterion, NONE, SystemError,
+    BondBehaviour, BondThreshold, CHUNK, NONE, SystemError,
 };
 use crate::{
     assembly::{Row, Transfer},
@@ -27,7 +27,7 @@ use crate::{
 pub(super) struct MovingBody<const D: usize> {
     pub pass: Box<dyn BondPass<D>>,
     pub kinematics: BondKinematics,
-    pub failure: Option<FailureCriterion>,
+    pub failure: Option<BondThreshold>,
     /// How bonds expand that know their temperature; none if they do not.
     pub heat: Option<PointHeat<D>>,
     /// Whether the law damages bonds.
@@ -132,7 +132,7 @@ impl<const D: usize> PassInput<'_, D> {
         let material = |p: usize| body.cloud.material.get(p).copied().unwrap_or(0);
         let by_bond = |i: usize, k: usize, _: &Vector<D>| {
             let materials = [material(i), material(families.of(i)[k] as usize)];
-            let at = |c: &FailureCriterion| c.at(body.cloud.horizon.lattice_of(i), materials);
+            let at = |c: &BondThreshold| c.at(body.cloud.horizon.lattice_of(i), materials);
             behaviour.failure.as_ref().map_or(f64::INFINITY, at)
         };
         let broken = behaviour
@@ -150,11 +150,11 @@ impl<const D: usize> PassInput<'_, D> {
             failure: match &behaviour.failure {
                 None if law.damages() => Some(BondCriterion::Uniform(f64::INFINITY)),
                 None => None,
-                Some(FailureCriterion::Uniform(s)) => Some(BondCriterion::Uniform(*s)),
-                Some(FailureCriterion::PerLattice(_) | FailureCriterion::ByMaterials(_)) => {
+                Some(BondThreshold::Uniform(s)) => Some(BondCriterion::Uniform(*s)),
+                Some(BondThreshold::PerLattice(_) | BondThreshold::ByMaterials(_)) => {
                     Some(BondCriterion::PerBond(&by_bond))
                 }
-                Some(FailureCriterion::Tearing(p)) => Some(BondCriterion::TearingParameter(*p)),
+                Some(BondThreshold::State(state)) => Some(BondCriterion::State(&**state)),
             }
             .map(|critical| Failure {
                 critical,
@@ -323,8 +323,7 @@ impl<const D: usize> MovingBody<D> {
         let mut pass = PassInput {
             body,
             law: &p.law,
-            // accelerators know no temperature
-            accelerator: p.accelerator().filter(|_| behaviour.heat.is_none()),
+            accelerator: p.accelerator().filter(|_| behaviour.suits_accelerators()),
             families,
             is_whole: all_pass,
             rows: &has_force,

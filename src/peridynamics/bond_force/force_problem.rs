@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::kinematics::BondKinematics;
 use crate::{
     parallel,
-    peridynamics::{Families, Law, PdBody, force_state::PLASTIC_STRAIN},
+    peridynamics::{Families, Law, PdBody, failure::StateCriterion, force_state::PLASTIC_STRAIN},
     system::Ranks,
     tensor::Vector,
 };
@@ -63,15 +63,15 @@ pub enum BondForce<'a, const D: usize> {
     },
 }
 
-/// What breaks a bond: the stretch beyond which it does, or a tearing parameter.
+/// Threshold at which a bond breaks: a stretch, or a state.
 #[derive(Clone, Copy)]
 pub enum BondCriterion<'a, const D: usize> {
     /// The same for all bonds.
     Uniform(f64),
     /// A number per bond; the same from both ends.
     PerBond(&'a BondFunction<'a, D>),
-    /// No stretch, but this mean of the tearing parameters of a bond's ends, [SAND2015-7998] eq. (6.33); of laws that remember a plastic strain.
-    TearingParameter(f64),
+    /// No stretch, but a state of points and bonds, which the generic pass alone knows.
+    State(&'a dyn StateCriterion),
 }
 
 /// When bonds fail.
@@ -187,9 +187,9 @@ pub enum KernelError {
         /// Its name.
         law: &'static str,
     },
-    /// A tearing parameter for a law that does not flow.
+    /// A criterion of plastic flow for a law that does not flow.
     #[error(
-        "bond pass: points of this law remember no plastic strain, of which a tearing parameter is made; give a critical stretch"
+        "bond pass: points of this law remember no plastic strain, by which bonds are to break; give a critical stretch"
     )]
     NoFlow,
     /// The lattice pass was asked for where there is none.
@@ -238,7 +238,7 @@ impl<const D: usize> BondSetup<'_, D> {
         let s = match failure.critical {
             BondCriterion::Uniform(s) => s,
             BondCriterion::PerBond(f) => f(i, k, xi),
-            BondCriterion::TearingParameter(_) => return f64::INFINITY,
+            BondCriterion::State(_) => return f64::INFINITY,
         };
         self.kinematics.limit(s)
     }

@@ -19,7 +19,7 @@ use crate::{
     parallel,
     peridynamics::{
         DeformedFamily, EnergyDensity, Families, ForceState, HistoryLayout, KeptDamage, Law, Past,
-        PdBody, Present, StatePart, body::split_rows, tearing_parameter::Flow,
+        PdBody, Present, StatePart, body::split_rows, failure::Flow,
     },
     system::{ExactSum, FailureUpdate, Interval},
     tensor::{Tensor, Vector},
@@ -93,15 +93,15 @@ pub(super) struct Scratch<const D: usize> {
     pair: Vec<f64>,
     omega: Vec<f64>,
     difference: Vec<Vector<D>>,
-    extension: Vec<f64>,
-    direction: Vec<Vector<D>>,
+    pub(super) extension: Vec<f64>,
+    pub(super) direction: Vec<Vector<D>>,
     /// The bond of each entry, counted over all families.
-    of: Vec<usize>,
+    pub(super) of: Vec<usize>,
     past: Vec<f64>,
     present: Vec<f64>,
     pub(super) point: Vec<f64>,
     pub(super) principal_stress: [f64; 3],
-    force: Vec<Vector<D>>,
+    pub(super) force: Vec<Vector<D>>,
     is_whole: bool,
     damage: f64,
     pub(super) carried: Option<Tensor<D>>,
@@ -189,7 +189,7 @@ impl<const D: usize> Generic<D> {
         let damaged_through = vec![false; counted];
         let by_points = PointForces::new(states, points);
         let kept = if by_points.is_some() { 0 } else { bonds };
-        let failure = BondFailure::new(setup, body);
+        let failure = BondFailure::new(setup, body, &reverse);
         let mut pass = Self {
             law: Arc::clone(law),
             layout,
@@ -312,7 +312,7 @@ impl<const D: usize> Generic<D> {
         let Some(law) = self.law.force_state() else {
             return EnergyDensity::default();
         };
-        let asks = matches!(self.failure, BondFailure::Tearing(_));
+        let asks = self.failure.reads().flow;
         let parts = s.split(self.state[i].as_ref(), asks);
         let past = Past {
             point: &past.point[own],
@@ -442,6 +442,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
         breakage: FailureUpdate,
     ) -> u64 {
         self.last.clear();
+        self.failure.keep(u);
         if breakage == FailureUpdate::Update {
             self.last = self.failing(u);
             if !self.last.is_empty() {
@@ -476,11 +477,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
         if let Some(drag) = self.points.as_mut().and_then(|p| p.drag.as_mut()) {
             drag.commit();
         }
-        if let BondFailure::Tearing(tearing) = &mut self.failure {
-            let (intact, outcome) = (&self.intact, &self.outcome);
-            let flow = |i: usize| outcome[i].flow;
-            tearing.advance(&self.families, &self.volume, |bond| intact[bond], flow);
-        }
+        self.advance_failure();
         let own = self.outcome.iter().zip(&self.row);
         own.filter(|(_, row)| **row)
             .map(|(outcome, _)| outcome.dissipated)

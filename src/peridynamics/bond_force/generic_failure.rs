@@ -11,8 +11,8 @@ use super::{
 use crate::{
     parallel,
     peridynamics::{
+        failure::{BondResponse, EndOfStep, Flow, tension},
         force_state::PLASTIC_STRAIN,
-        tearing_parameter::{Flow, tension},
     },
     tensor::{Tensor, Vector, determinant, least_eigenvalue},
 };
@@ -49,15 +49,16 @@ impl<const D: usize> Generic<D> {
                 };
                 s.excess > limit * s.length
             }
-            BondFailure::Tearing(tearing) => tearing.breaks(i, self.neighbour(bond)),
+            BondFailure::State { state, .. } => state.breaks([i, self.neighbour(bond)], bond),
         };
-        // the points at which bonds may fail
-        let least = match &self.failure {
-            BondFailure::Never => return Vec::new(),
-            BondFailure::Stretch(_) => None,
-            BondFailure::Tearing(tearing) => Some((tearing.values(), tearing.least_that_breaks())),
+        let may = |i: usize| match &self.failure {
+            BondFailure::Never => false,
+            BondFailure::Stretch(_) => true,
+            BondFailure::State { state, .. } => state.may_break(i),
         };
-        let may = |i: usize| least.is_none_or(|(values, least)| values[i] >= least);
+        if matches!(self.failure, BondFailure::Never) {
+            return Vec::new();
+        }
         parallel::listed(self.position.len(), 64, |i, failing| {
             let is_flattened = self.is_flattened(i, u);
             if self.no_fail[i] || !(is_flattened || may(i)) {
@@ -76,11 +77,46 @@ impl<const D: usize> Generic<D> {
     pub(super) fn flow(&self, i: usize, s: &Scratch<D>) -> Flow {
         let names = self.layout.point;
         let place = names.iter().position(|name| *name == PLASTIC_STRAIN);
-        let (Some(place), BondFailure::Tearing(_)) = (place, &self.failure) else {
+        let Some(place) = place.filter(|_| self.failure.reads().flow) else {
             return Flow::default();
         };
         let before = self.past.point[i * names.len() + place];
         Flow::new([before, s.point[place]], || tension(&s.principal_stress))
+    }
+
+    /// Ends a step of a criterion of a state.
+    pub(super) fn advance_failure(&mut self) {
+        let mut failure = std::mem::replace(&mut self.failure, BondFailure::Never);
+        if let BondFailure::State {
+            state,
+            displacement,
+            ..
+        } = &mut failure
+        {
+            let flow = |i: usize| self.outcome[i].flow;
+            // at the end of the step nothing more is remembered
+            let bonds = |i: usize, each: &mut dyn FnMut(usize, BondResponse)| {
+                let mut s = Scratch::default();
+                s.carried = self.carried_of(i).copied();
+                let (displaced, intact) = (|j| at(displacement, j), |b: usize| self.intact[b]);
+                self.respond(i, &displaced, intact, 0.0, &self.past, &mut s);
+                for (k, bond) in s.of.iter().enumerate() {
+                    let response = BondResponse {
+                        extension: s.extension[k],
+                        force: s.force[k].dot(&s.direction[k]),
+                    };
+                    each(*bond, response);
+                }
+            };
+            state.advance(&EndOfStep {
+                families: &self.families,
+                volume: &self.volume,
+                is_intact: &self.intact,
+                flow: &flow,
+                bonds: &bonds,
+            });
+        }
+        self.failure = failure;
     }
 
     /// Energy that the points with rows would store less at these displacements, for the bonds that the last pass broke.
@@ -104,7 +140,7 @@ impl<const D: usize> Generic<D> {
         lost
     }
 
-    /// Bonds that stand, history, tearing parameter, and what drags and points remember.
+    /// Bonds that stand, history of the law and of the criterion, and what drags and points remember.
     pub(super) fn words(&self) -> Vec<u64> {
         let mut words = Vec::new();
         if !matches!(self.failure, BondFailure::Never) {
@@ -115,8 +151,13 @@ impl<const D: usize> Generic<D> {
             let bonds = self.intact.len() as u64;
             words = super::pack(&bits.collect::<Vec<u8>>(), bonds);
         }
-        let torn = self.failure.kept();
-        let history = self.past.point.iter().chain(&self.past.bonds).chain(torn);
+        let failure = self.failure.history();
+        let history = self
+            .past
+            .point
+            .iter()
+            .chain(&self.past.bonds)
+            .chain(failure);
         words.extend(history.map(|x| x.to_bits()));
         let drag = self.points.as_ref().and_then(|p| p.drag.as_ref());
         let moved = drag.into_iter().flat_map(|drag| drag.kept());
@@ -128,11 +169,11 @@ impl<const D: usize> Generic<D> {
 
     /// Puts them back; false, and nothing changed, if they belong to another pass.
     pub(super) fn restore(&mut self, state: &[u64]) -> bool {
-        let torn = self.failure.kept().len();
+        let of_failure = self.failure.history().len();
         let drag = self.points.as_mut().and_then(|p| p.drag.as_mut());
         let dragged = drag.map_or(0, |drag| drag.kept().count());
         let carried = self.carried.as_ref().map_or(0, |c| c.numbers().count());
-        let kept = self.past.point.len() + self.past.bonds.len() + torn + dragged + carried;
+        let kept = self.past.point.len() + self.past.bonds.len() + of_failure + dragged + carried;
         let Some(words) = state.len().checked_sub(kept) else {
             return false;
         };
@@ -142,7 +183,7 @@ impl<const D: usize> Generic<D> {
         match &self.failure {
             BondFailure::Never if !words.is_empty() => return false,
             BondFailure::Never => {}
-            BondFailure::Stretch(_) | BondFailure::Tearing(_) => {
+            BondFailure::Stretch(_) | BondFailure::State { .. } => {
                 if !super::unpack(words, bonds, &mut bits) {
                     return false;
                 }
@@ -151,14 +192,20 @@ impl<const D: usize> Generic<D> {
                 }
             }
         }
-        let torn = self.failure.kept_mut();
+        let mut criterion = self.failure.history().to_vec();
         let own = self.past.point.iter_mut().chain(&mut self.past.bonds);
         let drag = self.points.as_mut().and_then(|p| p.drag.as_mut());
         let moved = drag.into_iter().flat_map(|drag| drag.kept_mut());
         let carried = self.carried.iter_mut().flat_map(|c| c.numbers_mut());
-        for (number, word) in own.chain(torn).chain(moved).chain(carried).zip(history) {
+        for (number, word) in own
+            .chain(&mut criterion)
+            .chain(moved)
+            .chain(carried)
+            .zip(history)
+        {
             *number = f64::from_bits(*word);
         }
+        self.failure.restore(&criterion);
         self.present.clone_from(&self.past);
         self.recall_intact(None);
         self.recall_damaged_through();

@@ -66,8 +66,8 @@ impl<const D: usize> ForceStates<D> for Generic<D> {
             .enumerate()
             .filter(|(_, name)| !name.is_empty());
         let mut found: Vec<_> = named.map(|(k, name)| (*name, column(k))).collect();
-        if let BondFailure::Tearing(tearing) = &self.failure {
-            found.push(("tearing parameter", tearing.values().to_vec()));
+        if let BondFailure::State { state, .. } = &self.failure {
+            found.extend(state.fields());
         }
         found
     }

@@ -119,8 +119,8 @@ impl<const D: usize> List<D> {
             })),
         };
         let limit = match setup.failure.map(|f| f.critical) {
-            // a list has no law that flows
-            None | Some(super::BondCriterion::TearingParameter(_)) => Limit::Never,
+            // a criterion of a state takes the generic pass
+            None | Some(super::BondCriterion::State(_)) => Limit::Never,
             Some(super::BondCriterion::Uniform(_)) => {
                 Limit::Uniform(setup.limit(0, 0, &crate::tensor::Vector::zeros()))
             }

@@ -277,9 +277,9 @@ fn pass<const D: usize>(setup: &BondSetup<'_, D>) -> Result<Box<dyn BondPass<D>>
             }));
     }
     lists?;
-    let tears = (setup.failure.as_ref())
-        .is_some_and(|f| matches!(f.critical, BondCriterion::TearingParameter(_)));
-    if tears && !setup.flows() {
+    let reads_flow = (setup.failure.as_ref())
+        .is_some_and(|f| matches!(f.critical, BondCriterion::State(s) if s.reads().flow));
+    if reads_flow && !setup.flows() {
         return Err(KernelError::NoFlow);
     }
     if let BondForce::Law { law, body } = setup.force {

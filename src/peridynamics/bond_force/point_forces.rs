@@ -9,7 +9,6 @@ use rayon::prelude::*;
 
 use super::{
     BondKinematics,
-    bond_failure::BondFailure,
     carried_deformation::{conjugate, felt},
     family_control::FamilyControl,
     generic::{Generic, History, NONE, Outcome},
@@ -22,9 +21,9 @@ use crate::{
     peridynamics::{
         KeptDamage, StatePart,
         body::split_rows,
+        failure::{Flow, tension},
         force_state::PLASTIC_STRAIN,
         shape_tensor::spanned_inverse,
-        tearing_parameter::{Flow, tension},
         zero_energy::{ZeroEnergyControl, control_left, excess_length},
     },
     system::Interval,
@@ -164,7 +163,7 @@ impl<const D: usize> Generic<D> {
             ..
         } = points;
         let flows = self.layout.point.iter().position(|n| *n == PLASTIC_STRAIN);
-        let flows = flows.filter(|_| matches!(self.failure, BondFailure::Tearing(_)));
+        let flows = flows.filter(|_| self.failure.reads().flow);
         let all = given.by_points(D).zip(strength).zip(gradient).zip(own);
         let all = all.zip(histories).zip(&mut outcome).enumerate();
         parallel::for_each(all.with_min_len(16), |(i, point)| {

@@ -17,6 +17,7 @@ pub(super) const CONSTANTS: Constants = Constants {
     lambda: 1.7,
     shear: 1.3,
     influence: Influence::Gaussian,
+    micromodulus: crate::peridynamics::Micromodulus::InverseDistance,
     kinematics: crate::material::Kinematics::Solid,
     density: 2.5,
     is_heated: false,

@@ -168,9 +168,7 @@ impl Whole {
         };
         let stretch = match setup.failure.map(|f| f.critical) {
             Some(BondCriterion::PerBond(f)) => numbers(f),
-            Some(BondCriterion::Uniform(_) | BondCriterion::TearingParameter(_)) | None => {
-                Vec::new()
-            }
+            Some(BondCriterion::Uniform(_) | BondCriterion::State(_)) | None => Vec::new(),
         };
         let mut neighbours = vec![0; all];
         shared.each_bond(
@@ -216,7 +214,7 @@ pub(super) fn with_all_families<const D: usize, T>(
         critical: match failure.critical {
             BondCriterion::PerBond(_) => BondCriterion::PerBond(&stretch),
             BondCriterion::Uniform(s) => BondCriterion::Uniform(s),
-            BondCriterion::TearingParameter(p) => BondCriterion::TearingParameter(p),
+            BondCriterion::State(state) => BondCriterion::State(state),
         },
         ..failure
     });

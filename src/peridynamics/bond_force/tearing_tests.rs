@@ -3,7 +3,7 @@
 use super::generic_tests::with_law;
 use super::{reference_force::*, *};
 use crate::{
-    peridynamics::{Families, laws},
+    peridynamics::{Families, failure::CriticalTearing, laws},
     tensor::Vector,
 };
 
@@ -40,6 +40,7 @@ fn points_that_flow_under_a_constant_triaxiality_fail_at_the_integral_of_the_tea
         lambda,
         shear,
         influence: crate::peridynamics::Influence::Gaussian,
+        micromodulus: crate::peridynamics::Micromodulus::InverseDistance,
         kinematics: crate::material::Kinematics::Solid,
         density: 1.0,
         is_heated: false,
@@ -57,8 +58,9 @@ fn points_that_flow_under_a_constant_triaxiality_fail_at_the_integral_of_the_tea
             true => 2.0 / 3.0 * (1.0 + 1.5 * triaxiality),
             false => 0.0,
         };
+        let criterion = CriticalTearing(critical);
         let failure = Failure {
-            critical: BondCriterion::TearingParameter(critical),
+            critical: BondCriterion::State(&criterion),
             no_fail: &[],
         };
         let check = |mut pass: Box<dyn BondPass<3>>| {

@@ -1,6 +1,10 @@
 //! The bond-based material: `T⟨ξ⟩ = ½ λ(|ξ|) ξ (ξ · η)` to first order, `½ λ |ξ|² e M` with geometrically exact bonds (prototype microelastic brittle).
 
+use std::sync::Arc;
+
+use super::{Constants, NamedLaw, Parameter, Ratio};
 use crate::{
+    material::Kinematics,
     peridynamics::{
         Accelerator, BondEnergy, DeformedFamily, Departure, EnergyDensity, Family, ForceState,
         HistoryLayout, Influence, Law, LinearForceState, Micromodulus, MomentConditions, Past,
@@ -34,6 +38,18 @@ impl<const D: usize> BondBased<D> {
             micromodulus,
             tensor: Tensor4::isotropic(strength, strength),
         }
+    }
+}
+
+impl<const D: usize> NamedLaw<D> for BondBased<D> {
+    const KEY: &'static str = "bond-based";
+    const ABOUT: &'static str = "Bonds that act alone; Poisson's ratio follows (1/3 in plane stress, 1/4 in plane strain and solids).";
+    const RATIO: Ratio = Ratio::Pairwise;
+    const KINEMATICS: &'static [Kinematics] = Kinematics::ALL;
+    const PARAMETERS: &'static [Parameter] = &[];
+
+    fn build(constants: Constants, _values: &[f64]) -> Arc<dyn Law<D>> {
+        Arc::new(Self::new(constants.micromodulus, constants.shear))
     }
 }
 

@@ -34,6 +34,7 @@ impl Point {
             lambda: 0.4 * YOUNG,
             shear: 0.4 * YOUNG,
             influence: Influence::Gaussian,
+            micromodulus: crate::peridynamics::Micromodulus::InverseDistance,
             kinematics: Kinematics::Solid,
             density: 1.0,
             is_heated: false,

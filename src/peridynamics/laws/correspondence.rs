@@ -1,6 +1,10 @@
 //! Elastic correspondence: a classical stress through the family's deformation gradient.
 
+use std::sync::Arc;
+
+use super::{Constants, NamedLaw, Parameter, Ratio};
 use crate::{
+    material::Kinematics,
     peridynamics::{
         BondEnergy, Departure, Family, ForceState, Influence, Law, LinearForceState,
         MomentConditions, PdError, ShellTarget, StatePart, ZeroEnergyControl, invert_shape_tensor,
@@ -47,6 +51,30 @@ impl<const D: usize> Correspondence<D> {
         self.control = control;
         self.slowness = (density / self.tensor.get(0, 0, 0, 0)).sqrt();
         self
+    }
+}
+
+/// The strength of the stabilising term, for scenes.
+pub(super) const STABILISATION: Parameter = Parameter {
+    key: "stabilisation",
+    about: "Strength of the zero-energy control relative to the bonds of an LPS; 0 switches it off.",
+    default: Some(1.0),
+    least: 0.0,
+    most: 1e6,
+    usual: 1.0,
+    words: &[],
+};
+
+impl<const D: usize> NamedLaw<D> for Correspondence<D> {
+    const KEY: &'static str = "correspondence";
+    const ABOUT: &'static str = "Elastic correspondence: the local law applied to a deformation gradient averaged over the family.";
+    const RATIO: Ratio = Ratio::Any;
+    const KINEMATICS: &'static [Kinematics] = Kinematics::ALL;
+    const PARAMETERS: &'static [Parameter] = &[STABILISATION];
+
+    fn build(constants: Constants, values: &[f64]) -> Arc<dyn Law<D>> {
+        let (lambda, shear) = (constants.lambda, constants.shear);
+        Arc::new(Self::new(constants.influence, lambda, shear, values[0]))
     }
 }
 

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio};
+use super::{
+    Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio, correspondence::STABILISATION,
+};
 use crate::{
     material::{EquivalentStrain, Kinematics, ScalarDamage, ScalarDamageSettings, SofteningCurve},
     peridynamics::Law,
@@ -49,7 +51,7 @@ impl<const D: usize> NamedLaw<D> for DamageCorrespondence<D> {
             "The measure of the strain that damages: extensions alone (\"mazars\"), or the energy of the undamaged material, in compression too.",
             &["mazars", "energy"],
         ),
-        LocalCorrespondence::<D>::STABILISATION,
+        STABILISATION,
         LocalCorrespondence::<D>::CONTROL,
     ];
 
@@ -109,6 +111,7 @@ mod tests {
             lambda: LAMBDA,
             shear: SHEAR,
             influence: Influence::Gaussian,
+            micromodulus: crate::peridynamics::Micromodulus::InverseDistance,
             kinematics: Kinematics::Solid,
             density: 1.0,
             is_heated: false,

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use super::plastic::{STRAINS, plastic};
-use super::{Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio};
+use super::{
+    Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio, correspondence::STABILISATION,
+};
 use crate::{
     material::{Hardening, JohnsonCook, Kinematics},
     peridynamics::Law,
@@ -90,7 +92,7 @@ impl<const D: usize> NamedLaw<D> for JohnsonCookCorrespondence<D> {
             (1e-3, 1e2),
             1.03,
         ),
-        LocalCorrespondence::<D>::STABILISATION,
+        STABILISATION,
         // tests of all laws take it for large strains, and `plastic-correspondence` for small ones
         Parameter {
             usual: 1.0,

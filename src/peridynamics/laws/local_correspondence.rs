@@ -56,17 +56,6 @@ impl<const D: usize> LocalCorrespondence<D> {
         self.band.as_ref().map_or(&*self.local, |band| &*band.law)
     }
 
-    /// The strength of the stabilising term, for scenes.
-    pub const STABILISATION: Parameter = Parameter {
-        key: "stabilisation",
-        about: "Strength of the zero-energy control relative to the bonds of an LPS; 0 switches it off.",
-        default: Some(1.0),
-        least: 0.0,
-        most: 1e6,
-        usual: 1.0,
-        words: &[],
-    };
-
     /// What resists zero-energy modes, for scenes.
     pub const CONTROL: Parameter = Parameter::words(
         "zero-energy-control",

@@ -1,6 +1,10 @@
 //! The linear peridynamic solid (LPS), any Poisson ratio.
 
+use std::sync::Arc;
+
+use super::{Constants, NamedLaw, Parameter, Ratio};
 use crate::{
+    material::Kinematics,
     peridynamics::{
         Accelerator, BondEnergy, DeformedFamily, Departure, EnergyDensity, Family, ForceState,
         HistoryLayout, Influence, Law, LinearForceState, MomentConditions, Past, PdError, Present,
@@ -36,6 +40,20 @@ impl<const D: usize> LinearPeridynamicSolid<D> {
             shear: mu,
             tensor: Tensor4::isotropic(lambda, mu),
         }
+    }
+}
+
+impl<const D: usize> NamedLaw<D> for LinearPeridynamicSolid<D> {
+    const KEY: &'static str = "lps";
+    const ABOUT: &'static str =
+        "Ordinary state-based law (linear peridynamic solid), any Poisson ratio.";
+    const RATIO: Ratio = Ratio::Any;
+    const KINEMATICS: &'static [Kinematics] = Kinematics::ALL;
+    const PARAMETERS: &'static [Parameter] = &[];
+
+    fn build(constants: Constants, _values: &[f64]) -> Arc<dyn Law<D>> {
+        let (lambda, shear) = (constants.lambda, constants.shear);
+        Arc::new(Self::new(constants.influence, lambda, shear))
     }
 }
 

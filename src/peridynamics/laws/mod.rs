@@ -43,7 +43,10 @@ mod viscoelastic;
 use std::sync::Arc;
 
 use crate::material::{Expanding, Kinematics, LocalLaw, Reduced};
-use crate::peridynamics::{Influence, Law, ZeroEnergyControl, force_state::PLASTIC_STRAIN};
+use crate::peridynamics::failure::BondTraits;
+use crate::peridynamics::{
+    Influence, Law, Micromodulus, ZeroEnergyControl, force_state::PLASTIC_STRAIN,
+};
 
 pub use bond_based::BondBased;
 pub use continuum_damage::ContinuumDamage;
@@ -119,6 +122,8 @@ pub struct Constants {
     pub shear: f64,
     /// The influence function ω of the scene, for laws that have one \[1\].
     pub influence: Influence,
+    /// Shape of the stiffness of a bond over its length, for laws that have a choice \[1\].
+    pub micromodulus: Micromodulus,
     /// What the dimension stands for.
     pub kinematics: Kinematics,
     /// Density ρ [kg/m^D].
@@ -187,12 +192,12 @@ pub trait NamedLaw<const D: usize> {
 /// Every law of this folder with usual numbers, for tests that hold for all of them.
 #[cfg(test)]
 pub(crate) fn every<const D: usize>() -> Vec<Arc<dyn Law<D>>> {
-    use crate::peridynamics::Micromodulus;
     let constants = Constants {
         // a bar of Poisson's ratio 1/4
         lambda: if D == 1 { 0.65 } else { 1.7 },
         shear: 1.3,
         influence: Influence::Gaussian,
+        micromodulus: Micromodulus::InverseDistance,
         kinematics: match D {
             1 => Kinematics::Bar,
             2 => Kinematics::PlaneStrain,
@@ -201,25 +206,11 @@ pub(crate) fn every<const D: usize>() -> Vec<Arc<dyn Law<D>>> {
         density: 1.0,
         is_heated: false,
     };
-    let Constants { lambda, shear, .. } = constants;
-    let typed: [Arc<dyn Law<D>>; 3] = [
-        Arc::new(BondBased::new(Micromodulus::InverseDistance, shear)),
-        Arc::new(LinearPeridynamicSolid::new(
-            Influence::Gaussian,
-            lambda,
-            shear,
-        )),
-        Arc::new(Correspondence::new(Influence::Gaussian, lambda, shear, 1.0)),
-    ];
     let named = Named::ALL.iter().map(|law| {
         let values: Vec<f64> = law.parameters().iter().map(|p| p.usual).collect();
         law.build(constants, &values)
     });
-    typed
-        .into_iter()
-        .chain(named.map(on_a_lattice))
-        .chain(mixtures())
-        .collect()
+    named.map(on_a_lattice).chain(mixtures()).collect()
 }
 
 /// A law whose constants follow from a lattice, for a family of six bonds or less.
@@ -245,7 +236,6 @@ fn on_a_lattice<const D: usize>(law: Arc<dyn Law<D>>) -> Arc<dyn Law<D>> {
 /// Bodies of two materials, numbers 0 and 1, for the same tests.
 #[cfg(test)]
 fn mixtures<const D: usize>() -> impl Iterator<Item = Arc<dyn Law<D>>> {
-    use crate::peridynamics::Micromodulus;
     let bonds = |shear| -> Arc<dyn Law<D>> {
         Arc::new(BondBased::new(Micromodulus::InverseDistance, shear))
     };
@@ -261,6 +251,7 @@ fn mixtures<const D: usize>() -> impl Iterator<Item = Arc<dyn Law<D>>> {
             lambda: 1.7,
             shear,
             influence: Influence::Gaussian,
+            micromodulus: Micromodulus::InverseDistance,
             kinematics: match D {
                 1 => Kinematics::Bar,
                 2 => Kinematics::PlaneStrain,
@@ -337,26 +328,16 @@ macro_rules! named_laws {
                 match self { $(Self::$law => <$law<1> as NamedLaw<1>>::conflict(values),)* }
             }
 
-            /// Whether its bonds can break.
-            pub fn has_breakable_bonds(self) -> bool {
-                self.usual().has_breakable_bonds()
-            }
-
-            /// Whether what breaking its bonds costs is known ([`Law::bond_energy`]).
-            pub fn has_bond_energy(self) -> bool {
-                self.usual().bond_energy(1.0).is_some()
-            }
-
-            /// Whether its bonds lose their stiffness by a damage of their own.
-            pub fn damages(self) -> bool {
-                self.usual().damages()
-            }
-
-            /// Whether its points remember a plastic strain.
-            pub fn flows(self) -> bool {
+            /// Properties by which criteria of failure apply.
+            pub fn traits(self) -> BondTraits {
                 let law = self.usual();
-                let states = law.force_state();
-                states.is_some_and(|states| states.history().point.contains(&PLASTIC_STRAIN))
+                let history = law.force_state().map(|states| states.history());
+                BondTraits {
+                    breaks: law.has_breakable_bonds(),
+                    has_bond_energy: law.bond_energy(1.0).is_some(),
+                    flows: history.is_some_and(|h| h.point.contains(&PLASTIC_STRAIN)),
+                    damages: law.damages(),
+                }
             }
 
             /// The law of a bar, with usual numbers.
@@ -365,6 +346,7 @@ macro_rules! named_laws {
                     lambda: 0.5,
                     shear: 1.0,
                     influence: Influence::Gaussian,
+                    micromodulus: Micromodulus::InverseDistance,
                     kinematics: Kinematics::Bar,
                     density: 1.0,
                     is_heated: false,
@@ -382,6 +364,9 @@ macro_rules! named_laws {
 }
 
 named_laws! {
+    BondBased,
+    LinearPeridynamicSolid,
+    Correspondence,
     Hardening,
     SofteningBond,
     ContinuumDamage,

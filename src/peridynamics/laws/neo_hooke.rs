@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio};
+use super::{
+    Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio, correspondence::STABILISATION,
+};
 use crate::{
     material::{Kinematics, NeoHooke},
     peridynamics::Law,
@@ -18,10 +20,7 @@ impl<const D: usize> NamedLaw<D> for NeoHookeSolid<D> {
         "Correspondence with a compressible Neo-Hooke solid, for large rotations and strains.";
     const RATIO: Ratio = Ratio::Any;
     const KINEMATICS: &'static [Kinematics] = Kinematics::ALL;
-    const PARAMETERS: &'static [Parameter] = &[
-        LocalCorrespondence::<D>::STABILISATION,
-        LocalCorrespondence::<D>::CONTROL,
-    ];
+    const PARAMETERS: &'static [Parameter] = &[STABILISATION, LocalCorrespondence::<D>::CONTROL];
 
     fn build(constants: Constants, values: &[f64]) -> Arc<dyn Law<D>> {
         let shear = constants.shear;

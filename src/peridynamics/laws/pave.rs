@@ -200,6 +200,7 @@ mod tests {
             lambda: 1.7,
             shear: 1.3,
             influence: Influence::Gaussian,
+            micromodulus: crate::peridynamics::Micromodulus::InverseDistance,
             kinematics: Kinematics::Solid,
             density: 1.0,
             is_heated: false,

@@ -172,6 +172,7 @@ mod tests {
             lambda,
             shear,
             influence: Influence::Gaussian,
+            micromodulus: crate::peridynamics::Micromodulus::InverseDistance,
             kinematics: Kinematics::Solid,
             density: 1.0,
             is_heated: false,

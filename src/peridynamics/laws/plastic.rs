@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio};
+use super::{
+    Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio, correspondence::STABILISATION,
+};
 use crate::{
     material::{Hardening, J2, Kinematics, LocalLaw, LogarithmicJ2},
     peridynamics::Law,
@@ -55,7 +57,7 @@ impl<const D: usize> NamedLaw<D> for PlasticCorrespondence<D> {
             usual: 3.0,
             words: &[],
         },
-        LocalCorrespondence::<D>::STABILISATION,
+        STABILISATION,
         STRAINS,
         LocalCorrespondence::<D>::CONTROL,
     ];

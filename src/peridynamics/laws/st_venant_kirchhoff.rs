@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio};
+use super::{
+    Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio, correspondence::STABILISATION,
+};
 use crate::{
     material::{Kinematics, StVenantKirchhoff},
     peridynamics::Law,
@@ -17,10 +19,7 @@ impl<const D: usize> NamedLaw<D> for StVenantKirchhoffSolid<D> {
     const ABOUT: &'static str = "Correspondence with a St Venant–Kirchhoff solid, for large rotations and moderate strains.";
     const RATIO: Ratio = Ratio::Any;
     const KINEMATICS: &'static [Kinematics] = Kinematics::ALL;
-    const PARAMETERS: &'static [Parameter] = &[
-        LocalCorrespondence::<D>::STABILISATION,
-        LocalCorrespondence::<D>::CONTROL,
-    ];
+    const PARAMETERS: &'static [Parameter] = &[STABILISATION, LocalCorrespondence::<D>::CONTROL];
 
     fn build(constants: Constants, values: &[f64]) -> Arc<dyn Law<D>> {
         let shear = constants.shear;

@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use super::{Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio, relaxing};
+use super::{
+    Constants, LocalCorrespondence, NamedLaw, Parameter, Ratio, correspondence::STABILISATION,
+    relaxing,
+};
 use crate::{material::Kinematics, peridynamics::Law};
 
 /// [`LocalCorrespondence`] with the stress of [`crate::material::GeneralisedMaxwell`]; its zero-energy control is elastic.
@@ -28,10 +31,8 @@ impl<const D: usize> NamedLaw<D> for ViscoelasticCorrespondence<D> {
     const ABOUT: &'static str = "Correspondence with linear viscoelasticity: a shear modulus that relaxes by up to 16 Maxwell arms, an elastic bulk; the constants are those at once.";
     const RATIO: Ratio = Ratio::Any;
     const KINEMATICS: &'static [Kinematics] = Kinematics::ALL;
-    const PARAMETERS: &'static [Parameter] = &parameters(
-        LocalCorrespondence::<D>::STABILISATION,
-        LocalCorrespondence::<D>::CONTROL,
-    );
+    const PARAMETERS: &'static [Parameter] =
+        &parameters(STABILISATION, LocalCorrespondence::<D>::CONTROL);
 
     fn conflict(values: &[f64]) -> Option<(&'static str, String)> {
         relaxing::conflict(&values[..relaxing::NUMBERS])

@@ -3,7 +3,7 @@
 #![deny(clippy::wildcard_enum_match_arm)]
 
 use crate::coupling::semidiscrete::behaviour::{
-    BondBehaviour, ContactBehaviour, FailureCriterion, SystemError,
+    BondBehaviour, BondThreshold, ContactBehaviour, SystemError,
 };
 use crate::coupling::semidiscrete::{CoupledSystem, masses};
 use crate::coupling::{
@@ -13,6 +13,7 @@ use crate::fem::Locator;
 use crate::observe::summary::Decision;
 use crate::peridynamics::bond_force::{BondKinematics, Storage};
 use crate::peridynamics::critical_stretch as failure_stretch;
+use crate::peridynamics::failure::{Fracture, Threshold};
 use crate::progress::Progress;
 use crate::run::definiteness;
 use crate::run::equilibrium;
@@ -24,7 +25,6 @@ use crate::run::setup::RunSettings;
 use crate::run::thermal::Thermal;
 use crate::scene::failure::Breaking;
 use crate::scene::initial::InitialKind;
-use crate::scene::materials::Fracture;
 use crate::scene::region::Region;
 use crate::scene::spec::{BondsSpec, CalibrationSpec, PrecisionSpec};
 use crate::solve::explicit::State;
@@ -142,7 +142,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
 fn is_linear<const D: usize>(
     model: &Model<D>,
     rest: &RunSettings<D>,
-    failure: Option<&FailureCriterion>,
+    failure: Option<&BondThreshold>,
 ) -> bool {
     let breaking = &rest.breaking;
     failure.is_none()
@@ -174,7 +174,7 @@ fn storage(precision: PrecisionSpec) -> Storage {
 /// Returns in words the stretch at which bonds break, and the fracture energy of that; or the calibration of a law.
 fn failure_text<const D: usize>(
     model: &Model<D>,
-    critical: Option<&FailureCriterion>,
+    critical: Option<&BondThreshold>,
     breaking: &Breaking<D>,
 ) -> String {
     let law = model.peridynamics.as_ref().map(|p| &p.law);
@@ -182,8 +182,8 @@ fn failure_text<const D: usize>(
         return found;
     }
     let stretches = critical.map(|critical| match critical {
-        FailureCriterion::Uniform(s) => format!("bonds break at the stretch {s:.3e}"),
-        FailureCriterion::PerLattice(list) => {
+        BondThreshold::Uniform(s) => format!("bonds break at the stretch {s:.3e}"),
+        BondThreshold::PerLattice(list) => {
             let horizons = model.body().map_or(&[][..], |b| b.cloud.horizon.values());
             let each = list
                 .iter()
@@ -192,14 +192,14 @@ fn failure_text<const D: usize>(
             let each: Vec<String> = each.collect();
             format!("bonds break at the stretch {}", each.join(", "))
         }
-        FailureCriterion::ByMaterials(stretch) => stretches_of_materials(stretch, breaking),
-        FailureCriterion::Tearing(p) => format!("bonds break at the tearing parameter {p}"),
+        BondThreshold::ByMaterials(stretch) => stretches_of_materials(stretch, breaking),
+        BondThreshold::State(state) => format!("bonds break at {state}"),
     });
     if let (Some(s), Some(_)) = (&stretches, &breaking.several) {
         return s.clone();
     }
-    match (stretches, breaking.fracture) {
-        (Some(s), Some(Fracture::Energy(g))) => {
+    match (stretches, breaking.fracture.and_then(Fracture::energy)) {
+        (Some(s), Some(g)) => {
             let takes = match breaking.calibration {
                 CalibrationSpec::Lattice => "bonds through a plane of the lattice take it",
                 CalibrationSpec::Continuum => "bonds through a plane of a continuous body take it",
@@ -353,7 +353,7 @@ fn reason(error: &SystemError) -> String {
 pub(crate) fn failure_criterion<const D: usize>(
     model: &Model<D>,
     rest: &RunSettings<D>,
-) -> Result<Option<FailureCriterion>, RunError> {
+) -> Result<Option<BondThreshold>, RunError> {
     let (Some(fracture), Some(_), Some(p)) =
         (rest.breaking.fracture, model.body(), &model.peridynamics)
     else {
@@ -362,10 +362,10 @@ pub(crate) fn failure_criterion<const D: usize>(
     if let Some(several) = p.law.several() {
         return material_stretches::of(model, several, &rest.breaking).map(Some);
     }
-    let energy = match fracture {
-        Fracture::Stretch(s) => return Ok(Some(FailureCriterion::Uniform(s))),
-        Fracture::Tearing(p) => return Ok(Some(FailureCriterion::Tearing(p))),
-        Fracture::Energy(energy) => energy,
+    let energy = match fracture.criterion.threshold(fracture.value) {
+        Threshold::Stretch(s) => return Ok(Some(BondThreshold::Uniform(s))),
+        Threshold::State(state) => return Ok(Some(BondThreshold::State(state))),
+        Threshold::Energy(energy) => energy,
     };
     let mut list = Vec::new();
     for (horizon, per_square) in model.plane_energies()? {
@@ -381,8 +381,8 @@ pub(crate) fn failure_criterion<const D: usize>(
         })?);
     }
     Ok(Some(match list[..] {
-        [s] => FailureCriterion::Uniform(s),
-        _ => FailureCriterion::PerLattice(list),
+        [s] => BondThreshold::Uniform(s),
+        _ => BondThreshold::PerLattice(list),
     }))
 }
 
@@ -397,10 +397,10 @@ pub(crate) fn failing_stretch<const D: usize>(
     }
     Ok(
         failure_criterion(model, rest)?.and_then(|critical| match critical {
-            FailureCriterion::Uniform(s) => Some(s),
-            FailureCriterion::ByMaterials(of) => Some(of.smallest()).filter(|s| s.is_finite()),
-            FailureCriterion::PerLattice(list) => list.iter().copied().reduce(f64::min),
-            FailureCriterion::Tearing(_) => None,
+            BondThreshold::Uniform(s) => Some(s),
+            BondThreshold::ByMaterials(of) => Some(of.smallest()).filter(|s| s.is_finite()),
+            BondThreshold::PerLattice(list) => list.iter().copied().reduce(f64::min),
+            BondThreshold::State(_) => None,
         }),
     )
 }
@@ -428,10 +428,7 @@ pub(crate) fn plane_energy<const D: usize>(
         .and_then(|p| p.law.force_state());
     Ok(Some(PlaneEnergy {
         of_plane: stretch.powi(2) * per_square * law.map_or(1.0, |law| law.energy_ratio(stretch)),
-        typed: match rest.breaking.fracture {
-            Some(Fracture::Energy(energy)) => Some(energy),
-            _ => None,
-        },
+        typed: rest.breaking.fracture.and_then(Fracture::energy),
     }))
 }
 

@@ -1,13 +1,13 @@
 //! The stretch at which bonds of each material break, and those between two.
 
 use crate::coupling::Model;
-use crate::coupling::semidiscrete::behaviour::{FailureCriterion, StretchOfMaterials, SystemError};
+use crate::coupling::semidiscrete::behaviour::{BondThreshold, StretchOfMaterials, SystemError};
 use crate::peridynamics::Mixture;
 use crate::peridynamics::critical_stretch as failure_stretch;
+use crate::peridynamics::failure::Fracture;
 use crate::run::error::RunError;
 use crate::scene::failure::{Breaking, FractureOfMaterials};
 use crate::scene::material_interfaces::MaterialInterface;
-use crate::scene::materials::Fracture;
 use crate::scene::spec::CalibrationSpec;
 
 /// Critical stretches of the bonds in a body of several materials.
@@ -44,20 +44,19 @@ impl<const D: usize> Stretches<'_, D> {
 
     /// The stretch at which the bonds of a criterion break, of a plane between two materials, or within one.
     fn stretch(&self, fracture: Option<Fracture>, a: u16, b: u16) -> Result<f64, RunError> {
-        let energy = match fracture {
-            None | Some(Fracture::Tearing(_)) => return Ok(f64::INFINITY),
-            Some(Fracture::Stretch(s)) => return Ok(s),
-            Some(Fracture::Energy(energy)) => energy,
+        let of_energy = |energy: f64| -> Result<f64, RunError> {
+            let per_square = self.per_square_between(a, b)?;
+            let linear = failure_stretch::critical_stretch(energy, per_square)?;
+            let ratio = |m: u16, s: f64| {
+                let states = self.law.law(m).force_state();
+                states.map_or(1.0, |law| law.energy_ratio(s))
+            };
+            Ok(failure_stretch::stretch_of_equal_energy(linear, |s| {
+                0.5 * (ratio(a, s) + ratio(b, s))
+            })?)
         };
-        let per_square = self.per_square_between(a, b)?;
-        let linear = failure_stretch::critical_stretch(energy, per_square)?;
-        let ratio = |m: u16, s: f64| {
-            let states = self.law.law(m).force_state();
-            states.map_or(1.0, |law| law.energy_ratio(s))
-        };
-        Ok(failure_stretch::stretch_of_equal_energy(linear, |s| {
-            0.5 * (ratio(a, s) + ratio(b, s))
-        })?)
+        let typed = fracture.map(|f| f.stretch(of_energy)).transpose()?;
+        Ok(typed.flatten().unwrap_or(f64::INFINITY))
     }
 
     fn within(&self, material: u16) -> Result<f64, RunError> {
@@ -86,7 +85,7 @@ pub(super) fn of<const D: usize>(
     model: &Model<D>,
     law: &dyn Mixture<D>,
     breaking: &Breaking<D>,
-) -> Result<FailureCriterion, RunError> {
+) -> Result<BondThreshold, RunError> {
     let Some(fracture) = &breaking.several else {
         let law = law.law(law.used()[0]).name();
         return Err(SystemError::Law { law }.into());
@@ -104,7 +103,7 @@ pub(super) fn of<const D: usize>(
             table[usize::from(a) * count + usize::from(b)] = stretches.between(a, b)?;
         }
     }
-    Ok(FailureCriterion::ByMaterials(StretchOfMaterials::new(
+    Ok(BondThreshold::ByMaterials(StretchOfMaterials::new(
         count,
         |a, b| table[usize::from(a) * count + usize::from(b)],
     )))

@@ -6,7 +6,7 @@ use crate::peridynamics::critical_stretch::stretch_of_equal_energy;
 use crate::scene::conditions::Support;
 use crate::scene::draft::Draft;
 use crate::scene::error::SceneError;
-use crate::scene::materials::{Fracture, Material};
+use crate::scene::materials::Material;
 use crate::scene::region;
 use crate::tensor::{Tensor4, Vector};
 
@@ -80,15 +80,13 @@ fn micromodulus<const D: usize>(material: &Material<D>, r: f64, horizon: f64) ->
 
 /// The stretch at which bonds of a material break. A fracture energy that gives none is left to the run to refuse.
 fn critical_stretch<const D: usize>(material: &Material<D>, horizon: f64) -> Option<f64> {
-    match material.fracture? {
-        Fracture::Stretch(s) => Some(s),
-        // where the material flows is not known from an elastic solution
-        Fracture::Tearing(_) => None,
-        Fracture::Energy(energy) => {
-            let bonds = material.law.bond_energy(horizon)?;
-            let linear = bonds.critical_stretch::<D>(energy, horizon).ok()?;
-            let law = material.law.force_state();
-            stretch_of_equal_energy(linear, |s| law.map_or(1.0, |law| law.energy_ratio(s))).ok()
-        }
-    }
+    let of_energy = |energy: f64| {
+        let bonds = material.law.bond_energy(horizon).ok_or(())?;
+        let linear = (bonds.critical_stretch::<D>(energy, horizon)).map_err(|_| ())?;
+        let law = material.law.force_state();
+        let ratio = |s: f64| law.map_or(1.0, |law| law.energy_ratio(s));
+        stretch_of_equal_energy(linear, ratio).map_err(|_| ())
+    };
+    // where a criterion of a state holds is not known from an elastic solution
+    material.fracture?.stretch(of_energy).ok().flatten()
 }

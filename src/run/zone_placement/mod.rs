@@ -31,7 +31,7 @@ use crate::observe::summary::Decision;
 use crate::scene::bounds_checks;
 use crate::scene::draft::Draft;
 use crate::scene::error::{SceneError, SceneErrorKind};
-use crate::scene::materials::{Fracture, Material};
+use crate::scene::materials::Material;
 use crate::scene::peridynamics;
 use crate::scene::solve::Solve;
 use crate::scene::source::Span;
@@ -313,9 +313,16 @@ fn alone(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
 /// Refuses bonds that are damaged, or break, by something else than their stretch: no solution before the run shows the place where that begins.
 fn refuse_damage<const D: usize>(material: &Material<D>, span: &Span) -> Result<(), SceneError> {
     let does = match material.fracture {
-        _ if material.law.damages() => "takes their stiffness by a damage before they break",
-        Some(Fracture::Tearing(_)) => "breaks them by a tearing parameter",
-        Some(Fracture::Energy(_) | Fracture::Stretch(_)) | None => return Ok(()),
+        _ if material.law.damages() => {
+            "takes their stiffness by a damage before they break".to_owned()
+        }
+        Some(fracture) if !fracture.is_of_stretch() => {
+            format!(
+                "breaks them by a {}",
+                fracture.criterion.key().replace('-', " ")
+            )
+        }
+        _ => return Ok(()),
     };
     Err(SceneError::new(
         SceneErrorKind::Conflict,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::coupling::semidiscrete::behaviour::{BondBehaviour, FailureCriterion};
+use crate::coupling::semidiscrete::behaviour::{BondBehaviour, BondThreshold};
 use crate::coupling::{CoupledSystem, Model, Zone};
 use crate::peridynamics::bond_force::BondKinematics;
 use crate::progress::Silent;
@@ -299,7 +299,7 @@ fn a_scene_allocates_what_it_needs() {
     let bits = |critical_stretch: Option<f64>| {
         let behaviour = BondBehaviour {
             kinematics: BondKinematics::Linear,
-            failure: critical_stretch.map(FailureCriterion::Uniform),
+            failure: critical_stretch.map(BondThreshold::Uniform),
             no_fail: &|_| false,
             contact: None,
             storage: crate::peridynamics::bond_force::Storage::Double,

@@ -6,27 +6,19 @@ use std::sync::LazyLock;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
-use serde::de::{
-    self, DeserializeSeed, Deserializer, EnumAccess, MapAccess, VariantAccess, Visitor,
-    value::MapAccessDeserializer,
-};
+use serde::de::{self, DeserializeSeed, Deserializer, EnumAccess, VariantAccess, Visitor};
 
+use super::influence::InfluenceSpec;
 use super::named_law::{self, NamedSpec};
-use super::region::CellsSpec;
 use super::user_material::UmatSpec;
+use crate::peridynamics::failure::{self, FailureCriterion};
 use crate::peridynamics::laws::Named;
 use crate::scene::expression::Expression;
-use crate::scene::value::{Coordinates, Count, Number};
+use crate::scene::value::{Coordinates, Number};
 
 /// A material: its peridynamic law, beside which the local law is linear elasticity with the same constants.
 #[derive(Clone, Debug)]
 pub enum MaterialSpec {
-    /// Bonds that act alone; Poisson's ratio follows (1/3 in plane stress, 1/4 in plane strain and solids).
-    BondBased(BondBasedSpec),
-    /// Linearised ordinary state-based law (linear peridynamic solid), any Poisson ratio.
-    Lps(StateBasedSpec),
-    /// Elastic correspondence: the local law applied to a deformation gradient averaged over the family.
-    Correspondence(CorrespondenceSpec),
     /// A routine of a user's library.
     Umat(UmatSpec),
     /// A law of [`Named`].
@@ -37,20 +29,15 @@ impl MaterialSpec {
     /// Thermal expansion, where it is typed.
     pub fn thermal_expansion(&self) -> Option<&Number> {
         match self {
-            Self::BondBased(m) => m.thermal_expansion.as_ref(),
-            Self::Lps(m) => m.thermal_expansion.as_ref(),
             Self::Named(m) => m.thermal_expansion.as_ref(),
-            Self::Correspondence(m) => m.thermal_expansion.as_ref(),
             Self::Umat(m) => m.thermal_expansion.as_ref(),
         }
     }
 }
 
 /// Keys of materials.
-static KEYS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
-    let typed = ["bond-based", "lps", "correspondence", "umat"];
-    typed.iter().chain(Named::KEYS).copied().collect()
-});
+static KEYS: LazyLock<Vec<&'static str>> =
+    LazyLock::new(|| Named::KEYS.iter().copied().chain(["umat"]).collect());
 
 impl<'de> Deserialize<'de> for MaterialSpec {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -65,9 +52,6 @@ impl<'de> Deserialize<'de> for MaterialSpec {
             fn visit_enum<A: EnumAccess<'de>>(self, data: A) -> Result<MaterialSpec, A::Error> {
                 let (key, content) = data.variant_seed(MaterialKey)?;
                 Ok(match key {
-                    Key::BondBased => MaterialSpec::BondBased(content.newtype_variant()?),
-                    Key::Lps => MaterialSpec::Lps(content.newtype_variant()?),
-                    Key::Correspondence => MaterialSpec::Correspondence(content.newtype_variant()?),
                     Key::Umat => MaterialSpec::Umat(content.newtype_variant()?),
                     Key::Named(law) => {
                         MaterialSpec::Named(content.newtype_variant_seed(named_law::Seed(law))?)
@@ -81,9 +65,6 @@ impl<'de> Deserialize<'de> for MaterialSpec {
 
 /// The law that a key of a material names.
 enum Key {
-    BondBased,
-    Lps,
-    Correspondence,
     Umat,
     Named(Named),
 }
@@ -97,9 +78,6 @@ impl<'de> DeserializeSeed<'de> for MaterialKey {
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Key, D::Error> {
         let key = String::deserialize(deserializer)?;
         Ok(match key.as_str() {
-            "bond-based" => Key::BondBased,
-            "lps" => Key::Lps,
-            "correspondence" => Key::Correspondence,
             "umat" => Key::Umat,
             other => match Named::ALL.iter().find(|law| law.key() == other) {
                 Some(law) => Key::Named(*law),
@@ -124,28 +102,11 @@ impl JsonSchema for MaterialSpec {
                 "additionalProperties": false
             })
         };
-        let mut variants = vec![
-            of(
-                "bond-based",
-                "Bonds that act alone; Poisson's ratio follows (1/3 in plane stress, 1/4 in plane strain and solids).",
-                generator.subschema_for::<BondBasedSpec>(),
-            ),
-            of(
-                "lps",
-                "Ordinary state-based law (linear peridynamic solid), any Poisson ratio.",
-                generator.subschema_for::<StateBasedSpec>(),
-            ),
-            of(
-                "correspondence",
-                "Elastic correspondence: the local law applied to a deformation gradient averaged over the family.",
-                generator.subschema_for::<CorrespondenceSpec>(),
-            ),
-            of(
-                "umat",
-                "Correspondence with the stress of a user's routine, called as Abaqus calls UMAT; the program has to be built with the feature umat.",
-                generator.subschema_for::<UmatSpec>(),
-            ),
-        ];
+        let mut variants = vec![of(
+            "umat",
+            "Correspondence with the stress of a user's routine, called as Abaqus calls UMAT; the program has to be built with the feature umat.",
+            generator.subschema_for::<UmatSpec>(),
+        )];
         for law in Named::ALL {
             let content = named_law::schema(*law, generator);
             variants.push(of(law.key(), law.about(), content));
@@ -158,208 +119,25 @@ impl JsonSchema for MaterialSpec {
 }
 
 impl MaterialSpec {
-    /// Returns the fracture criteria of a material whose bonds can break; the bonds of all others are known to first order only.
-    pub fn fracture(&self) -> Option<FractureSpec<'_>> {
-        let (law, energy, stretch, tearing) = match self {
-            Self::BondBased(m) => ("bond-based", &m.fracture_energy, &m.critical_stretch, None),
-            Self::Lps(m) => ("lps", &m.fracture_energy, &m.critical_stretch, None),
-            Self::Named(m) => (
-                m.law.key(),
-                &m.fracture_energy,
-                &m.critical_stretch,
-                m.tearing_parameter.as_ref(),
-            ),
-            Self::Umat(m) => ("umat", &None, &m.critical_stretch, None),
-            Self::Correspondence(_) => return None,
-        };
-        Some(FractureSpec {
-            law,
-            typed: [
-                (FractureKey::Energy, energy.as_ref()),
-                (FractureKey::Stretch, stretch.as_ref()),
-                (FractureKey::Tearing, tearing),
-            ],
-        })
-    }
-}
-
-/// Fracture criteria of a material, as typed.
-pub struct FractureSpec<'a> {
-    /// The key of the material's law.
-    pub law: &'static str,
-    /// Keys, and the number that is typed.
-    pub typed: [(FractureKey, Option<&'a Number>); 3],
-}
-
-/// Key of a fracture criterion of a material.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FractureKey {
-    /// By the energy per area of a new crack.
-    Energy,
-    /// By the stretch of the bond.
-    Stretch,
-    /// By the tearing parameter of its ends.
-    Tearing,
-}
-
-impl FractureKey {
-    /// As a scene types it.
-    pub fn key(self) -> &'static str {
+    /// Key of its law.
+    pub fn law(&self) -> &'static str {
         match self {
-            Self::Energy => "fracture-energy",
-            Self::Stretch => "critical-stretch",
-            Self::Tearing => "tearing-parameter",
+            Self::Named(m) => m.law.key(),
+            Self::Umat(_) => "umat",
         }
     }
-}
 
-/// The constants of a bond-based material.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub struct BondBasedSpec {
-    /// Young's modulus E.
-    pub youngs_modulus: Number,
-    /// Density.
-    #[serde(default)]
-    pub density: Option<Number>,
-    /// Linear thermal expansion α per degree, with `[temperature]`.
-    #[serde(default)]
-    pub thermal_expansion: Option<Number>,
-    /// Dependence of the bond stiffness on the bond length; "inverse-distance" if left out.
-    #[serde(default)]
-    pub micromodulus: MicromodulusSpec,
-    /// Energy per area of a new crack, from which the critical stretch of bonds follows; without it and `critical-stretch` no bond breaks.
-    #[serde(default)]
-    pub fracture_energy: Option<Number>,
-    /// Stretch at which a bond breaks, instead of `fracture-energy`.
-    #[serde(default)]
-    pub critical_stretch: Option<Number>,
-    /// The cells that this material fills: the name of a set, or a shape that holds their centroids.
-    #[serde(default)]
-    pub cells: Option<CellsSpec>,
-}
-
-/// The constants of a state-based material.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub struct StateBasedSpec {
-    /// Young's modulus E.
-    pub youngs_modulus: Number,
-    /// Poisson's ratio.
-    pub poisson_ratio: Number,
-    /// Density.
-    #[serde(default)]
-    pub density: Option<Number>,
-    /// Linear thermal expansion α per degree, with `[temperature]`.
-    #[serde(default)]
-    pub thermal_expansion: Option<Number>,
-    /// Energy per area of a new crack, from which the critical stretch of bonds follows; without it and `critical-stretch` no bond breaks.
-    #[serde(default)]
-    pub fracture_energy: Option<Number>,
-    /// Stretch at which a bond breaks, instead of `fracture-energy`.
-    #[serde(default)]
-    pub critical_stretch: Option<Number>,
-    /// The cells that this material fills: the name of a set, or a shape that holds their centroids.
-    #[serde(default)]
-    pub cells: Option<CellsSpec>,
-}
-
-/// The constants of a correspondence material.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub struct CorrespondenceSpec {
-    /// Young's modulus E.
-    pub youngs_modulus: Number,
-    /// Poisson's ratio.
-    pub poisson_ratio: Number,
-    /// Density.
-    #[serde(default)]
-    pub density: Option<Number>,
-    /// Linear thermal expansion α per degree, with `[temperature]`.
-    #[serde(default)]
-    pub thermal_expansion: Option<Number>,
-    /// Strength of the stabilising bond force, relative to that of an LPS; 1 if left out, 0 switches it off.
-    #[serde(default)]
-    pub stabilisation: Option<Number>,
-    /// The cells that this material fills: the name of a set, or a shape that holds their centroids.
-    #[serde(default)]
-    pub cells: Option<CellsSpec>,
-}
-
-/// Stiffness of a bond over its length, up to a factor that Young's modulus and the horizon fix.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum MicromodulusSpec {
-    /// `λ = c / |ξ|³`: force proportional to stretch (SAND2015-7998 section 3.4).
-    #[default]
-    InverseDistance,
-    /// `λ = c / |ξ|²`.
-    Constant,
-    /// `λ = c`.
-    Uniform,
-    /// `λ = c (1 - |ξ|/δ) / |ξ|³`.
-    Triangular,
-    /// `λ = c ω(|ξ|) / |ξ|²` with an influence function (SAND2015-7998 eq. (5.13a)).
-    Influence(InfluenceSpec),
-}
-
-/// An influence function: `{ degree = 3, alpha = 0 }`, or "gaussian".
-#[derive(Clone, Debug)]
-pub enum InfluenceSpec {
-    /// `P_n / |ξ|^α` (SAND2015-7998 eq. (5.8)).
-    Polynomial(PolynomialSpec),
-    /// `exp(-|ξ|²/δ²)`.
-    Gaussian,
-}
-
-/// Degree and exponent of a polynomial influence function.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub struct PolynomialSpec {
-    /// Degree n of P_n: 0, 1, 3, 5 or 7.
-    pub degree: Count,
-    /// Exponent α: 0 or 1.
-    #[serde(default)]
-    pub alpha: Count,
-}
-
-impl<'de> Deserialize<'de> for InfluenceSpec {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Influences;
-        impl<'de> Visitor<'de> for Influences {
-            type Value = InfluenceSpec;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("`{ degree = 3, alpha = 0 }` or \"gaussian\"")
-            }
-
-            fn visit_str<E: de::Error>(self, v: &str) -> Result<InfluenceSpec, E> {
-                match v {
-                    "gaussian" => Ok(InfluenceSpec::Gaussian),
-                    _ => Err(E::unknown_variant(v, &["gaussian"])),
-                }
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<InfluenceSpec, A::Error> {
-                PolynomialSpec::deserialize(MapAccessDeserializer::new(map))
-                    .map(InfluenceSpec::Polynomial)
+    /// Criteria by which its bonds break, each with its number.
+    pub fn failure(&self) -> Vec<(&'static dyn FailureCriterion, &Number)> {
+        match self {
+            Self::Named(m) => m.failure.iter().map(|(c, number)| (*c, number)).collect(),
+            Self::Umat(m) => {
+                let typed = m.critical_stretch.iter();
+                typed
+                    .map(|number| (failure::CRITICAL_STRETCH, number))
+                    .collect()
             }
         }
-        deserializer.deserialize_any(Influences)
-    }
-}
-
-impl JsonSchema for InfluenceSpec {
-    fn schema_name() -> Cow<'static, str> {
-        "InfluenceSpec".into()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let polynomial = generator.subschema_for::<PolynomialSpec>();
-        json_schema!({
-            "description": "An influence function: { degree = 3, alpha = 0 } for P_n / |ξ|^α, or \"gaussian\".",
-            "anyOf": [polynomial, { "const": "gaussian" }]
-        })
     }
 }
 

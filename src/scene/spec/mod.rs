@@ -5,7 +5,7 @@
 //! | file | content |
 //! |---|---|
 //! | `mesh.rs` | the mesh |
-//! | `material.rs`, `named_law.rs`, `user_material.rs` | materials and peridynamics; laws known by their key; compiled routines |
+//! | `influence.rs`, `material.rs`, `named_law.rs`, `user_material.rs` | materials and peridynamics; laws known by their key; compiled routines |
 //! | `material_interface.rs` | bonds between two materials |
 //! | `region.rs` | shapes and zones |
 //! | `coupling.rs` | the coupling |
@@ -18,6 +18,7 @@ mod condition;
 mod control;
 mod coupling;
 mod impactor;
+mod influence;
 mod material;
 mod material_interface;
 mod mesh;
@@ -37,10 +38,9 @@ pub use coupling::{
     LatticeStart, NoOptionsSpec, PartialStressSpec, TruncatedSpec, ZonesNeeded,
 };
 pub use impactor::{CylinderSpec, ImpactorMotionSpec, ImpactorSpec, PlaneSpec, SphereSpec};
+pub use influence::{InfluenceSpec, MicromodulusSpec, PolynomialSpec};
 pub use material::{
-    BondBasedSpec, CorrespondenceSpec, FractureKey, InfluenceSpec, LatticeSpec, MaterialSpec,
-    MicromodulusSpec, PeridynamicsSpec, PointsSpec, PolynomialSpec, StateBasedSpec, SurfacesSpec,
-    VolumesSpec, WeightsSpec,
+    LatticeSpec, MaterialSpec, PeridynamicsSpec, PointsSpec, SurfacesSpec, VolumesSpec, WeightsSpec,
 };
 pub use material_interface::{MaterialInterfaceSpec, StiffnessSpec};
 pub use mesh::{

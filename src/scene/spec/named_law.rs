@@ -6,7 +6,9 @@ use std::sync::LazyLock;
 use schemars::{Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Deserialize, DeserializeSeed, Deserializer, MapAccess, Visitor};
 
+use super::influence::MicromodulusSpec;
 use super::region::CellsSpec;
+use crate::peridynamics::failure::{self, FailureCriterion};
 use crate::peridynamics::laws::{Named, Ratio};
 use crate::scene::value::{Number, Text};
 
@@ -23,12 +25,10 @@ pub struct NamedSpec {
     pub density: Option<Number>,
     /// Linear thermal expansion per degree.
     pub thermal_expansion: Option<Number>,
-    /// Energy per area of a new crack.
-    pub fracture_energy: Option<Number>,
-    /// Stretch at which a bond breaks.
-    pub critical_stretch: Option<Number>,
-    /// Tearing parameter at which a bond breaks.
-    pub tearing_parameter: Option<Number>,
+    /// Shape of the stiffness of a bond over its length, of a law that has a choice.
+    pub micromodulus: Option<MicromodulusSpec>,
+    /// Criteria by which bonds break, each with its number.
+    pub failure: Vec<(&'static dyn FailureCriterion, Number)>,
     /// The cells that this material fills.
     pub cells: Option<CellsSpec>,
     /// Parameters of the law's own, in the order of [`Named::parameters`]; none where one is left out that has a default.
@@ -45,7 +45,7 @@ pub enum Given {
 }
 
 /// Keys that materials of all laws have, with what they are.
-const COMMON: [(&str, &str); 8] = [
+const COMMON: [(&str, &str); 6] = [
     ("youngs-modulus", "Young's modulus E."),
     ("poisson-ratio", "Poisson's ratio."),
     ("density", "Density."),
@@ -54,16 +54,8 @@ const COMMON: [(&str, &str); 8] = [
         "Linear thermal expansion α per degree, with `[temperature]`.",
     ),
     (
-        "fracture-energy",
-        "Energy per area of a new crack, from which the critical stretch of bonds follows; without it and `critical-stretch` no bond breaks.",
-    ),
-    (
-        "critical-stretch",
-        "Stretch at which a bond breaks, instead of `fracture-energy`.",
-    ),
-    (
-        "tearing-parameter",
-        "Tearing parameter at which a bond breaks: the equivalent plastic strain at failure of a bar in tension.",
+        "micromodulus",
+        "Stiffness of a bond over its length; \"inverse-distance\" if left out.",
     ),
     (
         "cells",
@@ -76,7 +68,10 @@ static FIELDS: LazyLock<Vec<Vec<&'static str>>> = LazyLock::new(|| {
     let of = |law: &Named| {
         let common = COMMON.iter().map(|c| c.0);
         let own = law.parameters().iter().map(|p| p.key);
-        common.filter(|key| takes(*law, key)).chain(own).collect()
+        let common = common.filter(|key| takes(*law, key));
+        let traits = law.traits();
+        let criteria = failure::all().iter().filter(|c| c.applies_to(&traits));
+        common.chain(criteria.map(|c| c.key())).chain(own).collect()
     };
     Named::ALL.iter().map(of).collect()
 });
@@ -85,9 +80,7 @@ static FIELDS: LazyLock<Vec<Vec<&'static str>>> = LazyLock::new(|| {
 fn takes(law: Named, key: &str) -> bool {
     match key {
         "poisson-ratio" => law.ratio() == Ratio::Any,
-        "fracture-energy" => law.has_bond_energy(),
-        "critical-stretch" => law.has_breakable_bonds(),
-        "tearing-parameter" => law.flows(),
+        "micromodulus" => law == Named::BondBased,
         _ => true,
     }
 }
@@ -120,10 +113,15 @@ impl<'de> Visitor<'de> for Seed {
         let parameters = law.parameters();
         let mut common: [Option<Number>; COMMON.len()] = Default::default();
         let mut own: Vec<Option<Given>> = vec![None; parameters.len()];
-        let mut cells: Option<CellsSpec> = None;
+        let (mut cells, mut micromodulus) = (None, None);
+        let mut failure = Vec::new();
         while let Some(key) = map.next_key_seed(Key(law))? {
             match key {
                 Field::Common(k) if COMMON[k].0 == "cells" => cells = Some(map.next_value()?),
+                Field::Common(k) if COMMON[k].0 == "micromodulus" => {
+                    micromodulus = Some(map.next_value()?);
+                }
+                Field::Failure(criterion) => failure.push((criterion, map.next_value()?)),
                 Field::Common(k) => common[k] = Some(map.next_value()?),
                 Field::Own(k) if parameters[k].words.is_empty() => {
                     own[k] = Some(Given::Number(map.next_value()?));
@@ -151,9 +149,8 @@ impl<'de> Visitor<'de> for Seed {
             poisson_ratio,
             density: taken("density"),
             thermal_expansion: taken("thermal-expansion"),
-            fracture_energy: taken("fracture-energy"),
-            critical_stretch: taken("critical-stretch"),
-            tearing_parameter: taken("tearing-parameter"),
+            micromodulus,
+            failure,
             cells,
             parameters: own,
         })
@@ -163,6 +160,7 @@ impl<'de> Visitor<'de> for Seed {
 /// A key of a law's material, by its place.
 enum Field {
     Common(usize),
+    Failure(&'static dyn FailureCriterion),
     Own(usize),
 }
 
@@ -177,13 +175,17 @@ impl<'de> DeserializeSeed<'de> for Key {
         let own = self.0.parameters().iter().position(|p| p.key == key);
         let common = COMMON.iter().position(|c| c.0 == key);
         let common = common.filter(|_| takes(self.0, &key));
-        match (own, common) {
-            (Some(k), _) => Ok(Field::Own(k)),
-            (None, Some(k)) => Ok(Field::Common(k)),
-            _ if key == "critical-stretch" && self.0.damages() => Err(de::Error::custom(format!(
-                "`critical-stretch` is no key of `{}`, whose bonds break by their own damage",
-                self.0.key()
-            ))),
+        let criterion = failure::of_key(&key).filter(|c| c.applies_to(&self.0.traits()));
+        match (own, common, criterion) {
+            (Some(k), ..) => Ok(Field::Own(k)),
+            (None, Some(k), _) => Ok(Field::Common(k)),
+            (None, None, Some(criterion)) => Ok(Field::Failure(criterion)),
+            _ if key == "critical-stretch" && self.0.traits().damages => {
+                Err(de::Error::custom(format!(
+                    "`critical-stretch` is no key of `{}`, whose bonds break by their own damage",
+                    self.0.key()
+                )))
+            }
             _ => Err(de::Error::unknown_field(&key, fields(self.0))),
         }
     }
@@ -191,10 +193,9 @@ impl<'de> DeserializeSeed<'de> for Key {
 
 /// The schema of a law's material.
 pub(super) fn schema(law: Named, generator: &mut SchemaGenerator) -> Schema {
-    let (number, cells) = (
-        generator.subschema_for::<Number>(),
-        generator.subschema_for::<CellsSpec>(),
-    );
+    let number = generator.subschema_for::<Number>();
+    let cells = generator.subschema_for::<CellsSpec>();
+    let micromodulus = generator.subschema_for::<MicromodulusSpec>();
     let mut properties = serde_json::Map::new();
     let mut required = vec!["youngs-modulus"];
     if law.ratio() == Ratio::Any {
@@ -206,7 +207,16 @@ pub(super) fn schema(law: Named, generator: &mut SchemaGenerator) -> Schema {
         properties.insert(key.to_owned(), entry);
     };
     for (key, about) in COMMON.iter().filter(|c| takes(law, c.0)) {
-        add(key, about, if *key == "cells" { &cells } else { &number });
+        let of = match *key {
+            "cells" => &cells,
+            "micromodulus" => &micromodulus,
+            _ => &number,
+        };
+        add(key, about, of);
+    }
+    let traits = law.traits();
+    for criterion in failure::all().iter().filter(|c| c.applies_to(&traits)) {
+        add(criterion.key(), criterion.about(), &number);
     }
     for parameter in law.parameters() {
         if parameter.words.is_empty() {

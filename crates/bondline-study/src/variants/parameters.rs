@@ -107,10 +107,7 @@ impl Base {
                 (Some(spacing) != cell()).then_some((spacing, None))
             }
         });
-        let breaks = |m: &MaterialSpec| {
-            let fracture = m.fracture();
-            fracture.is_some_and(|f| f.typed.iter().any(|(_, number)| number.is_some()))
-        };
+        let breaks = |m: &MaterialSpec| !m.failure().is_empty();
         let solve = spec.solve.as_ref().map(|s| s.get_ref());
         let moves = !matches!(solve, None | Some(SolveSpec::Static(_)));
         let transition = spec.zones.transition.as_ref().map(|t| t.get_ref());

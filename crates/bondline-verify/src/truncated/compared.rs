@@ -11,7 +11,7 @@ use super::Material;
 use crate::Effort;
 use crate::enclosed::{Case, Cells, Enclosed, Law, Method, SPACING, Widths, YOUNGS_MODULUS};
 use crate::typed;
-use bondline::coupling::semidiscrete::{BondBehaviour, FailureCriterion};
+use bondline::coupling::semidiscrete::{BondBehaviour, BondThreshold};
 use bondline::coupling::semidiscrete::{CoupledSystem, masses, scale_rows};
 use bondline::coupling::{BlendingFunction, FitDegree};
 use bondline::observe::report::{Columns, Table, TableRow};
@@ -215,7 +215,7 @@ fn run_crack(
         |x: &Vector<2>| is_band(&e, x, 1) || (breaks == Breaks::WithinZone && x.amax() > outside);
     let behaviour = BondBehaviour {
         kinematics: BondKinematics::Exact,
-        failure: Some(FailureCriterion::Uniform(CRITICAL)),
+        failure: Some(BondThreshold::Uniform(CRITICAL)),
         no_fail: &never,
         contact: None,
         storage: bondline::peridynamics::bond_force::Storage::Double,

@@ -1,7 +1,58 @@
-//! The tearing parameter: how close a ductile material is to failure, by plastic flow under tension.
+//! Tearing parameter: plastic flow under tension, by which ductile materials fail.
 
-use super::{Families, Horizon};
+use std::fmt;
+use std::sync::Arc;
+
+use super::{
+    BondTraits, EndOfStep, FailureCriterion, FailureState, Flow, Reads, StateCriterion, Threshold,
+    WholeBody,
+};
 use crate::parallel;
+
+/// A bond breaks once the mean of the tearing parameters of its ends reaches a number.
+#[derive(Debug)]
+pub struct TearingParameter;
+
+impl FailureCriterion for TearingParameter {
+    fn key(&self) -> &'static str {
+        "tearing-parameter"
+    }
+
+    fn about(&self) -> &'static str {
+        "Tearing parameter at which a bond breaks: the equivalent plastic strain at failure of a bar in tension."
+    }
+
+    fn applies_to(&self, law: &BondTraits) -> bool {
+        law.flows
+    }
+
+    fn threshold(&self, value: f64) -> Threshold {
+        Threshold::State(Arc::new(CriticalTearing(value)))
+    }
+}
+
+/// Tearing parameter at which bonds break.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CriticalTearing(pub f64);
+
+impl fmt::Display for CriticalTearing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "the tearing parameter {}", self.0)
+    }
+}
+
+impl StateCriterion for CriticalTearing {
+    fn reads(&self) -> Reads {
+        Reads {
+            flow: true,
+            bonds: false,
+        }
+    }
+
+    fn begin(&self, body: &WholeBody<'_>) -> Box<dyn FailureState> {
+        Box::new(Tearing::new(self.0, body))
+    }
+}
 
 /// The tearing parameter `P` of every point, averaged over families, and what of it breaks bonds.
 ///
@@ -14,31 +65,22 @@ use crate::parallel;
 /// A bond breaks where the mean of its ends' P reaches the critical value. As printed, Q lacks the power 4 and the maximum of (6.33), and R the rate. Here V is the volume of the family itself, its centre and the far points of its intact
 /// bonds: with that of the full ball the void beyond a surface would count twice, since the surface factor S, the share of the fullest family that a family has, is about it already.
 /// Q is taken over points that have flowed: in others the ratio says nothing, and is without bound where the stress is hydrostatic.
-pub(crate) struct TearingParameter {
+struct Tearing {
     /// P at which bonds break.
     critical: f64,
     /// S of each point.
     surface: Vec<f64>,
     /// P of each point at the beginning of the step.
     value: Vec<f64>,
+    /// Least P of a point whose bonds may break: with the largest there is at the other end.
+    least: f64,
     /// Kept between steps.
     share: Vec<Share>,
 }
 
-/// Plastic flow of a point within a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Flow {
-    /// Equivalent plastic strain at the end of the step.
-    pub strain: f64,
-    /// Its growth in the step.
-    pub growth: f64,
-    /// `max{0, 2 σ₁/(3 (σ₁ − σ̄))}`.
-    pub tension: f64,
-}
-
 impl Flow {
-    /// Of the plastic strains before and after a step; `tension` is asked for of points that have flowed alone.
-    pub fn new([before, strain]: [f64; 2], tension: impl FnOnce() -> f64) -> Self {
+    /// Flow between the plastic strains before and after a step; `tension` is asked for of points that have flowed alone.
+    pub(crate) fn new([before, strain]: [f64; 2], tension: impl FnOnce() -> f64) -> Self {
         Self {
             strain,
             growth: strain - before,
@@ -92,9 +134,9 @@ impl Share {
     }
 }
 
-impl TearingParameter {
-    /// Of points at rest, with the volumes of their whole families, centre included and none of places that are no part of the body, and the horizon of each.
-    pub fn new(critical: f64, family_volume: &[f64], horizon: &Horizon) -> Self {
+impl Tearing {
+    fn new(critical: f64, body: &WholeBody<'_>) -> Self {
+        let (family_volume, horizon) = (body.family_volume, body.horizon);
         // the fullest family of each lattice
         let mut fullest: Vec<f64> = Vec::new();
         for (i, volume) in family_volume.iter().enumerate() {
@@ -108,40 +150,28 @@ impl TearingParameter {
             critical,
             surface: surface.collect(),
             value: vec![0.0; family_volume.len()],
+            least: f64::INFINITY,
             share: vec![Share::default(); family_volume.len()],
         }
     }
 
-    /// P of each point.
-    pub fn values(&self) -> &[f64] {
-        &self.value
-    }
-
-    /// The same, to be put back.
-    pub fn values_mut(&mut self) -> &mut [f64] {
-        &mut self.value
-    }
-
-    /// The least P of a point whose bonds may break: with the largest there is at the other end.
-    pub fn least_that_breaks(&self) -> f64 {
+    /// Finds the least P of a point whose bonds may break.
+    fn find_least(&mut self) {
         let most = self.value.iter().copied().fold(0.0, f64::max);
         // with a margin for the rounding of a mean
-        (2.0 * self.critical - most) * (1.0 - 1e-12) - 1e-12 * most
+        self.least = (2.0 * self.critical - most) * (1.0 - 1e-12) - 1e-12 * most;
     }
+}
 
-    /// Whether the bond of two points breaks.
-    pub fn breaks(&self, i: usize, j: usize) -> bool {
-        0.5 * (self.value[i] + self.value[j]) >= self.critical
-    }
-
-    /// Ends a step in which each point had this `flow`; bonds are counted over all families.
-    pub fn advance(
-        &mut self,
-        families: &Families,
-        volume: &[f64],
-        is_intact: impl Fn(usize) -> bool + Sync,
-        flow: impl Fn(usize) -> Flow + Sync,
-    ) {
+impl FailureState for Tearing {
+    fn advance(&mut self, step: &EndOfStep<'_>) {
+        let EndOfStep {
+            families,
+            volume,
+            is_intact,
+            flow,
+            ..
+        } = *step;
         // what each point adds to the sums of the families that it is in; a point without a family has no flow of its own
         let surface = &self.surface;
         let share_of = |j: usize, share: &mut Share| {
@@ -164,7 +194,7 @@ impl TearingParameter {
             let mut sum = shares[i];
             let start = families.offsets[i];
             for (k, &j) in family.iter().enumerate() {
-                if is_intact(start + k) {
+                if is_intact[start + k] {
                     sum.add(&shares[j as usize]);
                 }
             }
@@ -173,12 +203,35 @@ impl TearingParameter {
             }
         };
         parallel::for_each_mut(&mut self.value, 64, grow);
+        self.find_least();
+    }
+
+    fn may_break(&self, point: usize) -> bool {
+        self.value[point] >= self.least
+    }
+
+    fn breaks(&self, [i, j]: [usize; 2], _bond: usize) -> bool {
+        0.5 * (self.value[i] + self.value[j]) >= self.critical
+    }
+
+    fn history(&self) -> &[f64] {
+        &self.value
+    }
+
+    fn restore(&mut self, history: &[f64]) {
+        self.value.copy_from_slice(history);
+        self.find_least();
+    }
+
+    fn fields(&self) -> Vec<(&'static str, Vec<f64>)> {
+        vec![("tearing parameter", self.value.clone())]
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::peridynamics::{Families, Horizon};
 
     #[test]
     fn tension_is_one_in_a_bar_and_grows_with_the_triaxiality() {
@@ -225,7 +278,13 @@ mod tests {
                 volume[i] + far.sum::<f64>()
             })
             .collect();
-        let mut tearing = TearingParameter::new(0.2, &whole, &Horizon::Uniform(2.0));
+        let body = WholeBody {
+            family_volume: &whole,
+            horizon: &Horizon::Uniform(2.0),
+            families: &families,
+            reverse: &[],
+        };
+        let mut tearing = Tearing::new(0.2, &body);
         let flowing = |strain: f64, growth: f64, tension: f64| Flow {
             strain,
             growth,
@@ -238,28 +297,29 @@ mod tests {
             families.offsets[i] + families.of(i).iter().position(|k| *k == j).unwrap()
         };
         let broken = [bond(3, 5), bond(5, 3)];
-        tearing.advance(
-            &families,
-            &volume,
-            |b| !broken.contains(&b),
-            |i| {
-                flowing(
-                    flow[i],
-                    0.5 * flow[i],
-                    if flow[i] > 0.0 { 1.0 + flow[i] } else { 1e300 },
-                )
+        let mut is_intact = vec![true; families.neighbours.len()];
+        for bond in broken {
+            is_intact[bond] = false;
+        }
+        tearing.advance(&EndOfStep {
+            families: &families,
+            volume: &volume,
+            is_intact: &is_intact,
+            flow: &|i| {
+                let tension = if flow[i] > 0.0 { 1.0 + flow[i] } else { 1e300 };
+                flowing(flow[i], 0.5 * flow[i], tension)
             },
-        );
+            bonds: &|_, _| {},
+        });
         let surface = |i: usize| whole[i] / 6.0;
         let q = (surface(1) * 1.1 + 2.0 * surface(2) * 1.2 + surface(3) * 1.3) / 4.0;
         let r = (0.1 + 2.0 * 0.2 + 0.3 + 0.0) * 0.5 / 5.0;
         let expected = q.powi(4) * r;
-        let found = tearing.values()[3];
+        let found = tearing.history()[3];
         assert!((found - expected).abs() < 1e-14, "{found} {expected}");
-        assert!(!tearing.breaks(2, 3));
-        tearing
-            .values_mut()
-            .copy_from_slice(&[0.0, 0.0, 0.15, 0.25, 0.1, 0.0, 0.0]);
-        assert!(tearing.breaks(2, 3) && !tearing.breaks(3, 4));
+        assert!(!tearing.breaks([2, 3], 0));
+        tearing.restore(&[0.0, 0.0, 0.15, 0.25, 0.1, 0.0, 0.0]);
+        assert!(tearing.breaks([2, 3], 0) && !tearing.breaks([3, 4], 0));
+        assert!(tearing.may_break(2) && tearing.may_break(3) && !tearing.may_break(0));
     }
 }
