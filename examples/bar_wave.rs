@@ -9,7 +9,7 @@ const DENSITY: f64 = 7800.0; // kg/m³
 const STRESS: f64 = 1e6; // Pa, the largest of the pulse
 const PULSE: f64 = 80e-6; // s, how long it lasts
 
-/// What d'Alembert's solution has at a distance from the end before anything comes back: all that the end was pushed by, a travel time ago, over ρ c.
+/// Returns d'Alembert's solution at a distance from the end before any reflection: the impulse per area on the end, a travel time ago, over ρ c.
 fn displacement(distance: f64, time: f64) -> f64 {
     let speed = (MODULUS / DENSITY).sqrt();
     let s = (time - distance / speed).clamp(0.0, PULSE);

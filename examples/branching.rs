@@ -58,7 +58,7 @@ const COUPLINGS: [(&str, &[&str]); 8] = [
     ),
 ];
 
-/// What a run tells.
+/// Results of a run.
 struct Crack {
     time: f64,
     point: f64,
@@ -71,7 +71,7 @@ struct Crack {
     points: usize,
     sites: usize,
     paths: [Vec<(f64, f64)>; 2],
-    /// What the momentum came to at most, of that of the plate with its energy; loads give it none.
+    /// Largest momentum, relative to that of the plate with its kinetic energy; loads give it none.
     drift: f64,
     motion: MotionSummary,
 }
@@ -103,7 +103,7 @@ impl Crack {
         (self.dissipated - m.missing_energy) / m.external_work
     }
 
-    /// Why the run ended before its time, if it did.
+    /// Returns the reason that the run ended before its time, if it did.
     fn stopped(&self) -> Option<String> {
         let m = &self.motion;
         let (time, place) = m.edge_reached.as_ref()?;
@@ -241,7 +241,7 @@ fn couplings() -> Result<Vec<Table>, Failure> {
     Ok(vec![table])
 }
 
-/// Where and when the crack branches, what it takes and how thin it is, against full peridynamics.
+/// Adds the errors of the branch point and time, of the dissipated energy and of the width of the branch, against full peridynamics.
 fn push_accuracy(table: &mut Table, name: &str, full: &Crack, coupled: &Crack) {
     let percent = |a: f64, b: f64| 100.0 * (a / b - 1.0).abs();
     table.push(TableRow::at_most(

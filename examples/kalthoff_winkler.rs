@@ -10,7 +10,7 @@ use shared::{Columns, Failure, argument, between, run};
 
 mod shared;
 
-/// How far a crack has run when its angle is taken \[m\].
+/// Distance of the crack tip from that of the notch at which the angle is taken \[m\].
 const RUN: f64 = 0.03;
 
 fn main() -> ExitCode {

@@ -80,7 +80,7 @@ impl Lattice {
         Some((right[0] - left[0]) * self.n as f64 / 2.0)
     }
 
-    /// How far the middle of the upper face of the slit moves away from the lower.
+    /// Returns the opening of the slit at its middle: displacement of the upper face relative to the lower.
     fn opening(&self) -> f64 {
         let (middle, half) = (self.n / 2, self.n / 120);
         let face = |j| self.at(middle, j).map_or(f64::NAN, |u| u[1]);

@@ -57,12 +57,12 @@
 //!
 //! # Units
 //!
-//! Nothing here knows a unit. Give all lengths, forces and stresses in one consistent set (m, N, Pa; mm, N, MPa; or none at all) and read the results in the same. The
+//! No units are built in. Give all lengths, forces and stresses in one consistent set (m, N, Pa; mm, N, MPa; or none at all) and read the results in the same. The
 //! units in doc comments say what kind of quantity a number is. A plane body is one unit thick, a bar has a cross-section of one unit.
 //!
 //! # Modules
 //!
-//! | module | what it knows |
+//! | module | contents |
 //! |---|---|
 //! | [`tensor`] | small tensors, const generic in `D` |
 //! | [`shape`] | shapes, signed distances, barriers that cut bonds |
@@ -74,9 +74,9 @@
 //! | [`assembly`] | sparse rows: places through sites, and the accumulator of one stiffness row |
 //! | [`system`] | the seam to solvers: a block-sparse stiffness and its symmetry |
 //! | [`solve`] | orderings, multifrontal factorisation, Krylov methods with multigrid, the static problem |
-//! | [`progress`] | what a long computation tells |
+//! | [`progress`] | progress reports of long computations |
 //! | [`observe`] | the only writers: VTU, CSV, JSON |
-//! | [`scene`] | TOML to a validated scene; the only module that knows TOML |
+//! | [`scene`] | TOML to a validated scene; the only module that reads TOML |
 //! | [`run`] | one run of a scene: laid out, proved, solved, written |
 //! | [`predict`] | what a run will need, without solving |
 //! | [`regular_file`] | refuses pipes, devices and folders in the place of a file |

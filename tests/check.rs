@@ -1,4 +1,4 @@
-//! What `check` predicts against what `run` measures, both by the binary: one process each, so that peaks are their own.
+//! Predictions of `check` against measurements of `run`, both by the binary: one process each, so that peaks are their own.
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -187,7 +187,7 @@ fn the_error_of_a_typed_scene_is_predicted() {
     }
 }
 
-/// Where no error is predicted, `check` says why, and what would help.
+/// Checks that `check` gives the reason and the remedy if no error is predicted.
 #[test]
 fn an_error_that_is_not_predicted_has_a_reason() {
     let folder = tempfile::tempdir().unwrap();
@@ -314,7 +314,7 @@ fn what_does_not_fit_is_refused_before_anything_is_laid_out() {
     }
 }
 
-/// What each process has of a plate of 20 × 10 points.
+/// Returns the share of each process in a plate of 20 × 10 points.
 fn shares(law: &str, solve: &str, count: usize) -> Vec<[u64; 4]> {
     let folder = tempfile::tempdir().unwrap();
     let text = format!(

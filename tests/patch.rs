@@ -132,7 +132,7 @@ fn affine_fields_leave_no_force_in_solids() {
     }
 }
 
-/// Where elements match the lattice a quadratic field passes the seam: the force per volume of each row is `C:∇∇u`, of those that are written for more than their site has too.
+/// Quadratic fields pass the seam where elements match the lattice: the force per volume of each row is `C:∇∇u`, of those that are written for more than their site has too.
 #[test]
 fn quadratic_fields_have_their_force_per_volume_on_matching_meshes() {
     for method in Method::ALL {
@@ -286,7 +286,7 @@ fn every_law_passes_every_coupling_or_is_told_one_that_takes_it() {
     assert!(taken_in_all > 60, "{taken_in_all}");
 }
 
-/// What a seam of truncated bonds makes of a law it takes over, or leaves linear: with geometrically exact bonds both have to be the derivative of one energy.
+/// Tests laws that a seam of truncated bonds takes over, or leaves linear: with geometrically exact bonds both have to be the derivative of one energy.
 #[test]
 fn forces_of_every_law_at_a_truncated_seam_are_derivatives_of_its_energy() {
     let mut taken = 0;

@@ -122,7 +122,7 @@ fn table(path: &Path) -> BTreeMap<String, Vec<f64>> {
     header.enumerate().map(column).collect()
 }
 
-/// What the program needs, without tests and suites, and the page of keys, which additions change too.
+/// Returns the files that the program needs, without tests and suites, and the page of keys, which additions change too.
 fn packages(root: &Path) -> Files {
     let mut files = Files::new();
     read(root, Path::new("src"), &mut files);

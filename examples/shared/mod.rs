@@ -1,4 +1,4 @@
-//! What the examples in time have in common: run a scene with some keys set otherwise, and read its tables.
+//! Shared code of the transient examples: runs a scene with some keys set otherwise, and reads its tables.
 
 #![allow(dead_code)]
 

@@ -163,7 +163,7 @@ pub(super) fn at_points<const D: usize>(
         .collect()
 }
 
-/// How much of a row is that of a splice, for what bonds do by themselves and for the state part of a law; the rest is that of a blending.
+/// Share s of the splice weighting in a row, for the pairwise part and for the state part of a law; the rest is that of a blending.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct SpliceShare {
     pub pair: f64,

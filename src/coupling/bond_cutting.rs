@@ -147,12 +147,12 @@ impl<const D: usize> LatticeFactors<D> {
         Ok(factors)
     }
 
-    /// Whether the points are a lattice's, whatever its axes.
+    /// Returns true if the points are those of a lattice, whatever its axes.
     pub fn is_lattice(&self) -> bool {
         self.axes.is_some()
     }
 
-    /// Whether the points are those of a lattice along the coordinate axes.
+    /// Returns true if the points are those of a lattice along the coordinate axes.
     pub fn is_axis_parallel(&self) -> bool {
         self.axes == Some(Tensor::identity())
     }
@@ -165,7 +165,7 @@ impl<const D: usize> LatticeFactors<D> {
         }
     }
 
-    /// Whether cells count in part.
+    /// Returns true if cells may count in part.
     pub fn has_partial_volumes(&self) -> bool {
         self.volumes != PartialVolume::Full
     }

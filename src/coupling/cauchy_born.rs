@@ -15,7 +15,7 @@ impl<const D: usize> Model<D> {
     /// Gives the finite elements of the points' materials the Cauchy–Born law of the lattice's whole family, with bonds that deform as `kinematics` says.
     ///
     /// # Errors
-    /// [`ModelError::Unsupported`] for points that have no such family in common, and for a law that remembers; [`ModelError::Family`] for a family that is too small.
+    /// [`ModelError::Unsupported`] for points that have no such family in common, and for a law with history variables; [`ModelError::Family`] for a family that is too small.
     pub fn follow_bonds(&mut self, kinematics: BondKinematics) -> Result<(), ModelError> {
         let Some(p) = &self.peridynamics else {
             return Ok(());
@@ -78,12 +78,12 @@ impl<const D: usize> Model<D> {
         Ok(())
     }
 
-    /// Whether elements follow the bonds, [`Model::follow_bonds`].
+    /// Returns true if elements follow the bonds, [`Model::follow_bonds`].
     pub fn follows_bonds(&self) -> bool {
         !self.cauchy_born.is_empty()
     }
 
-    /// Whether elements of a material, by its number, do.
+    /// Returns true if the elements of a material, by its number, follow the bonds.
     pub fn follows_bonds_in(&self, material: u16) -> bool {
         let law = self.cauchy_born.get(usize::from(material));
         law.is_some_and(Option::is_some)

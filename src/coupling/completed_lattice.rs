@@ -15,7 +15,7 @@ pub(super) struct CompletedLattice<const D: usize> {
     /// All points before any is dropped, with their new numbers, where elements need them.
     pub wide: Option<(PointCloud<D>, Vec<u32>)>,
     pub is_constant: bool,
-    /// Who has which families, where they are spread over processes.
+    /// Distribution of the families, where they are spread over processes.
     pub shared: Option<SharedFamilies>,
     /// Which families a process would hold, where they can be spread over processes.
     pub held: Option<HeldFamilies>,

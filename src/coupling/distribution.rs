@@ -58,7 +58,7 @@ impl<const D: usize> Model<D> {
         })
     }
 
-    /// Whether all sites are points, and leave next to nothing of the box around them empty.
+    /// Returns true if all sites are points, and leave next to nothing of the box around them empty.
     fn fills_a_box(&self, sites: &[Site<D>], spacing: f64) -> bool {
         let is_point = |site: &Site<D>| matches!(site.kind, SiteKind::Point(_));
         let (low, high) = self.mesh.bounds();

@@ -1,4 +1,4 @@
-//! Where the local model would be wrong, and where a bond could break, seen from the displacement at the nodes.
+//! Regions where the local model would be wrong, and where a bond could break, estimated from the displacement at the nodes.
 //!
 //! A peridynamic law with an even kernel sees of a smooth field, to the second order in the horizon,
 //!
@@ -34,16 +34,16 @@ const AVERAGED_OVER: f64 = 2.5;
 /// And at least over so many, or a cell has no neighbour.
 const AT_LEAST: f64 = 1.5;
 
-/// Cells per task: a number of its own, so that what a task remembers does not depend on the threads.
+/// Cells per task: a number of its own, so that what a task reuses does not depend on the number of threads.
 const CHUNK: usize = 1024;
 
-/// How far centres may be from where a regular mesh has them, relative to the size of a cell.
+/// Tolerance on the offset of centres from their places in a regular mesh, relative to the size of a cell.
 const ALIKE: f64 = 1e-12;
 
 /// No cell.
 const NONE: u32 = u32::MAX;
 
-/// What decides where peridynamics is needed.
+/// Criteria for the need of peridynamics.
 #[derive(Clone, Copy, Debug)]
 pub struct Criteria<'a, const D: usize> {
     /// The mesh of the whole body.
@@ -70,7 +70,7 @@ pub struct Criteria<'a, const D: usize> {
     pub held: &'a [bool],
 }
 
-/// Where peridynamics is needed, one entry per cell.
+/// Cells where peridynamics is needed, one entry per cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Need {
     /// The local model errs too much.
@@ -79,7 +79,7 @@ pub struct Need {
     pub stretch: Vec<bool>,
     /// Estimated error of the local model in the whole body, relative in the norm of energy.
     pub all_local: f64,
-    /// What remains of it outside of the cells of `error`.
+    /// Part of `all_local` that remains outside of the cells of `error`.
     pub remaining: f64,
     /// The part of the square of `all_local` that each cell has.
     pub squares: Vec<f64>,
@@ -101,7 +101,7 @@ pub fn gradient_ratio<const D: usize>(lambda: impl Fn(f64) -> f64, horizon: f64)
 }
 
 impl Need {
-    /// What remains of the estimated error of the local model outside of a set of cells, one entry per cell, relative in the norm of energy.
+    /// Returns the estimated error of the local model that remains outside of a set of cells, one entry per cell, relative in the norm of energy.
     pub fn remaining_outside(&self, cells: &[bool]) -> f64 {
         let outside = self
             .squares
@@ -113,7 +113,7 @@ impl Need {
 }
 
 impl<const D: usize> Criteria<'_, D> {
-    /// Where peridynamics is needed under a displacement.
+    /// Returns the cells where peridynamics is needed under a displacement.
     ///
     /// Shapes: `displacement` gives that of a node of the mesh \[m\].
     pub fn need(&self, displacement: impl Fn(usize) -> Vector<D> + Sync) -> Need {
@@ -359,7 +359,7 @@ fn kinds<const D: usize>(
 /// The strains around a cell.
 struct Around<'a, const D: usize> {
     criteria: &'a Criteria<'a, D>,
-    /// What a cell has in common with those before it, [`kinds`].
+    /// Kind of each cell, which it shares with the cells before it that are alike, [`kinds`].
     kind: Vec<u32>,
     neighbours: &'a [[u32; 6]],
     strains: &'a [Tensor<D>],
@@ -379,7 +379,7 @@ struct Reached {
 }
 
 impl Reached {
-    /// Whether a cell reaches the same cells, shifted, with the same weights: then all that are reached lie like those reached before.
+    /// Returns true if a cell reaches the same cells, shifted, with the same weights: then all that are reached lie like those reached before.
     fn serves(&self, c: usize, radius: f64, kind: &[u32]) -> bool {
         if self.from == NONE || (radius - self.radius).abs() > ALIKE * radius {
             return false;

@@ -1,4 +1,4 @@
-//! What a displacement needs against closed forms.
+//! Tests of the need of peridynamics under a displacement against closed forms.
 
 use super::*;
 use crate::mesh::generate::{Axis, Grid, cuboid, line, rectangle};

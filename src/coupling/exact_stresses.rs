@@ -33,7 +33,7 @@ pub type NodeGradient<const D: usize> = (u32, Vector<D>);
 
 /// The points whose partial stress sites feel, and the weights of these stresses.
 pub struct ExactStresses<const D: usize> {
-    /// What the points are numbered in; none for the model's own body.
+    /// Body in which the points are numbered; none for the model's own body.
     body: Option<Arc<PdBody<D>>>,
     law: Arc<dyn Law<D>>,
     /// The points, ascending.
@@ -45,7 +45,7 @@ pub struct ExactStresses<const D: usize> {
     first_weight: Vec<usize>,
     /// A place in `points`, and a.
     weights: Vec<(u32, Vector<D>)>,
-    /// Whether the displacement of a place of the cloud is asked for.
+    /// For each place of the cloud, true if its displacement is needed.
     is_asked: Vec<bool>,
 }
 
@@ -132,7 +132,7 @@ impl<const D: usize> ExactStresses<D> {
         });
     }
 
-    /// What the stress of a point has beyond the linear one, without what the element around a Gauss point has of its own.
+    /// Returns the stress of a point beyond the linear one, without the contribution of the element around a Gauss point.
     fn beyond(
         &self,
         body: &PdBody<D>,

@@ -11,13 +11,13 @@ use crate::{
     tensor::{Vector, padded},
 };
 
-/// How far from a position its points lie, in spacings.
+/// Search radius for the points around a position, in spacings.
 const AROUND: f64 = 1.6;
 
-/// As far, where cracks hide some of them.
+/// The same, where cracks hide some of them.
 const ASIDE: f64 = 2.4;
 
-/// As far, where nodes beside the seam have to help.
+/// The same, where nodes beside the seam have to help.
 const FAR: f64 = 4.0;
 
 /// Sites by cells one spacing wide.
@@ -33,7 +33,7 @@ pub struct Sampler<'a, const D: usize> {
     barriers: Barriers<D>,
 }
 
-/// What carries the displacement at a position.
+/// Carrier of the displacement at a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Carrier {
     /// A finite element, by its cell, and the reference coordinates of the position in it.
@@ -60,7 +60,7 @@ impl<'a, const D: usize> Sampler<'a, D> {
     }
 
     /// The displacement at `x` \[m\]: a site's own where one lies there, else by shape functions, else by an affine fit to the points within 1.6 spacings, or 2.4 beside a crack or a void, behind which no point counts.
-    /// Where these lie in one line (or plane), nodes of elements within 2.4 or 4 spacings help, or the nearest point stands alone. `None` outside of the body.
+    /// If these lie in one line (or plane), nodes of elements within 2.4 or 4 spacings help, or the nearest point stands alone. `None` outside of the body.
     pub fn displacement(&self, x: &Vector<D>, u: &[f64]) -> Option<Vector<D>> {
         let weights = self.weights(x)?;
         let of_site = |s: u32| Vector::<D>::from_fn(|a, _| u[s as usize * D + a]);
@@ -120,7 +120,7 @@ impl<'a, const D: usize> Sampler<'a, D> {
         points
     }
 
-    /// What carries the displacement at `x` \[m\]; `None` farther than 1.6 spacings from any point and outside of all elements.
+    /// Returns the carrier of the displacement at `x` \[m\]; `None` farther than 1.6 spacings from any point and outside of all elements.
     pub fn carrier(&self, x: &Vector<D>) -> Option<Carrier> {
         if let Some(located) = self.elements.locate(&self.model.mesh, x, 1e-9) {
             return Some(Carrier::Element(located.cell, padded(&located.reference)));

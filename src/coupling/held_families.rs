@@ -7,7 +7,7 @@ use super::{Coupling, Peridynamics, Reach};
 use crate::coupling::HorizonField;
 use crate::peridynamics::TIE_TOLERANCE;
 
-/// How many families deep the rows and fits of a seam look, by whether the force of a bond takes the states of its ends.
+/// Depth, in families, of the rows and fits of a seam, by whether the force of a bond takes the states of its ends.
 pub(super) const fn depth_of_seam(is_pairwise: bool) -> usize {
     // a bond that a face cuts, and those that a fit of a second layer changes; a state reaches one family farther, and so do the bonds that carry it
     if is_pairwise { 2 } else { 4 }

@@ -36,7 +36,7 @@ pub use shape::ImpactorShape;
 /// Sites per task; a constant, so that no result depends on the number of threads.
 const CHUNK: usize = 1024;
 
-/// How often contact counts in the bounds of a motion: at least six steps then pass in a period of a site on its penalty spring.
+/// Factor of contact in the bounds of a motion: at least six steps then pass in a period of a site on its penalty spring.
 pub const RESOLVED: f64 = 4.0;
 
 /// Round-off of the depth of a site, over the places that it is a difference of.
@@ -62,7 +62,7 @@ pub struct Impact<const D: usize> {
     impactors: Vec<RigidImpactor<D>>,
     /// Positions of the sites at rest.
     position: Vec<Vector<D>>,
-    /// How far the body reaches beyond each site \[m\].
+    /// Distance by which the body extends beyond each site \[m\].
     clearance: Vec<f64>,
     /// Sizes of the sites \[m\].
     size: Vec<f64>,
@@ -74,7 +74,7 @@ pub struct Impact<const D: usize> {
     bounds: (Vector<D>, Vector<D>),
     /// The size of the smallest site \[m\].
     smallest: f64,
-    /// How often contact counts in the bounds of eigenvalues and row sums.
+    /// Factor of contact in the bounds of eigenvalues and row sums.
     counted: f64,
     /// Memory for the forces on impactors.
     pushes: Mutex<Vec<f64>>,
@@ -83,9 +83,9 @@ pub struct Impact<const D: usize> {
 /// The sites that touch an impactor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ContactPatch {
-    /// How many there are.
+    /// Number of these sites.
     pub sites: u64,
-    /// How many lie side by side across the contact.
+    /// Number of sites side by side across the contact.
     pub across: f64,
 }
 

@@ -2,7 +2,7 @@
 
 use crate::tensor::{Tensor, Vector};
 
-/// How far a point may lie off its place in the lattice, in spacings, and by how much its volume may differ from that of a cell.
+/// Tolerance on the offset of a point from its place in the lattice, in spacings, and on the relative difference of its volume from that of a cell.
 const OFF: f64 = 1e-6;
 
 /// The axes of the square or cubic lattice of spacing `h` that all points are some of, as columns; none if they are scattered, or their volumes differ.

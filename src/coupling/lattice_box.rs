@@ -36,7 +36,7 @@ impl<const D: usize> LatticeBox<D> {
         })
     }
 
-    /// How many points there are.
+    /// Returns the number of points.
     pub fn total(&self) -> usize {
         self.counts.iter().product()
     }
@@ -46,7 +46,7 @@ impl<const D: usize> LatticeBox<D> {
         self.h
     }
 
-    /// Where a point lies.
+    /// Returns the position of a point.
     pub fn position(&self, index: usize) -> Vector<D> {
         let mut rest = index;
         let mut k = self.first;

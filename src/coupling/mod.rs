@@ -112,7 +112,7 @@ pub enum Zone {
     Nonlocal,
 }
 
-/// What a coupling makes of a cell.
+/// Role of a cell in a coupling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CellRole {
     /// A finite element with the local law.
@@ -123,7 +123,7 @@ pub enum CellRole {
     Points,
 }
 
-/// How far families have to be complete around the sites that are peridynamic points.
+/// Extent to which families have to be complete around the sites that are peridynamic points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reach {
     /// Their own families.
@@ -150,15 +150,15 @@ pub trait Coupling<const D: usize>: Send + Sync {
     /// Its usual name.
     fn name(&self) -> &'static str;
 
-    /// Whether the stiffness is symmetric.
+    /// Returns the symmetry of the stiffness.
     fn symmetry(&self) -> Symmetry {
         Symmetry::Unsymmetric
     }
 
-    /// What becomes of each cell, given the zones that the scene asks for.
+    /// Returns the role of each cell, given the zones that the scene asks for.
     fn roles(&self, mesh: &Mesh<D>, zones: &[Zone], largest_horizon: f64) -> Vec<CellRole>;
 
-    /// How far families have to be complete.
+    /// Returns the extent to which families have to be complete.
     fn reach(&self, law: &dyn LinearForceState<D>) -> Reach {
         if law.is_pairwise() {
             Reach::Own
@@ -167,19 +167,19 @@ pub trait Coupling<const D: usize>: Send + Sync {
         }
     }
 
-    /// How many families deep from the elements every process needs those of all points, where it may hold those of its own alone elsewhere; none where that is not known.
+    /// Returns the depth, in families from the elements, within which every process needs the families of all points; elsewhere it may hold those of its own alone. None if that is not known.
     ///
     /// Rows of sites beside a seam take the families of several, and every process works out and proves all of a seam.
     fn families_of_all(&self, _law: &dyn LinearForceState<D>) -> Option<usize> {
         None
     }
 
-    /// Whether processes may hold families so in motion, too: which rows are those of the body alone, and where these end, does not take families that lie elsewhere.
+    /// Returns true if processes may also hold families so in motion: which rows are those of the body alone, and where these end, does not depend on families that lie elsewhere.
     fn moves_with_own_families(&self) -> bool {
         false
     }
 
-    /// Whether its rows hold the products of dilatations and deviatoric extensions that a law with [`LinearForceState::has_deviators`] has; any other coupling is refused for such a law.
+    /// Returns true if its rows hold the products of dilatations and deviatoric extensions of a law with [`LinearForceState::has_deviators`]; any other coupling is refused for such a law.
     fn takes_deviators(&self) -> bool {
         false
     }
@@ -200,7 +200,7 @@ pub trait Coupling<const D: usize>: Send + Sync {
 type Rows<C, const D: usize> =
     for<'a> fn(&C, &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError>;
 
-/// What shows that the energy behind symmetric rows is never negative.
+/// Evidence that the energy behind symmetric rows is never negative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Definiteness {
     /// It is a sum of squares, whatever the model is.
@@ -213,10 +213,10 @@ pub enum Definiteness {
 
 /// Rows that hold bonds of the body among other terms: a nonlinear system computes the forces of those bonds, and the rest stays a row.
 pub trait MixedRows<const D: usize>: Sync {
-    /// Whether the row of a site, not that of the body alone, holds bonds of the body.
+    /// Returns true if the row of a site is not that of the body alone, but holds bonds of the body.
     fn has_body_bonds(&self, site: usize) -> bool;
 
-    /// Whether a bond between two points of the body's cloud, the first with [`MixedRows::has_body_bonds`], is one of those. A bond that the seam cuts is not: as one of the body it would pull at its point as it rotates, and at the finite elements as if it did not.
+    /// Returns true if a bond between two points of the body's cloud, the first with [`MixedRows::has_body_bonds`], is one of those. A bond that the seam cuts is not: as one of the body it would pull at its point as it rotates, and at the finite elements as if it did not.
     fn is_body_bond(&self, i: usize, j: usize) -> bool;
 
     /// Adds the row of a site that [`MixedRows::has_body_bonds`], less the bonds of the body.
@@ -242,10 +242,10 @@ pub trait Operator<const D: usize>: Sync {
     /// The blending function β of a site: 1 where it is peridynamic, 0 where it is local.
     fn beta(&self, site: usize) -> f64;
 
-    /// Whether the row of a site is that of the peridynamic body alone, all of its bonds whole: only there may bonds be geometrically exact, and break.
+    /// Returns true if the row of a site is that of the peridynamic body alone, all of its bonds whole: only there may bonds be geometrically exact, and break.
     fn is_body_row(&self, site: usize) -> bool;
 
-    /// Whether rows count elements and bonds by their materials, [`Row::count_only`]: only then do materials expand differently at the seam.
+    /// Returns true if rows count elements and bonds by their materials, [`Row::count_only`]: only then do materials expand differently at the seam.
     fn counts_materials(&self) -> bool {
         false
     }
@@ -259,7 +259,7 @@ pub trait Operator<const D: usize>: Sync {
     /// The partial stresses that rows of sites have, where the operator has such: of geometrically exact bonds a nonlinear system adds what is not linear in them.
     fn exact_stresses(&self) -> Option<ExactStresses<D>>;
 
-    /// What shows that the energy behind symmetric rows is never negative.
+    /// Returns the evidence that the energy behind symmetric rows is never negative.
     fn definiteness(&self) -> Definiteness {
         Definiteness::SumOfSquares
     }

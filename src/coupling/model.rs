@@ -1,4 +1,4 @@
-//! What all couplings share: sites, peridynamic points, their families, and the places at the seam that follow sites.
+//! Common model of all couplings: sites, peridynamic points, their families, and the places at the seam that follow sites.
 
 use std::any::Any;
 use std::sync::{Arc, OnceLock};
@@ -33,7 +33,7 @@ use crate::{
     tensor::{Tensor4, Vector},
 };
 
-/// What keeps degrees of freedom at a site.
+/// Carrier of the degrees of freedom at a site.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SiteKind {
     /// A node of finite elements, by its number in the mesh.
@@ -61,7 +61,7 @@ pub struct Model<const D: usize> {
     pub mesh: Mesh<D>,
     /// The zone of each cell.
     pub zones: Vec<Zone>,
-    /// What the coupling makes of each cell.
+    /// Role of each cell in the coupling.
     pub roles: Vec<CellRole>,
     /// Sites: nodes first, then points.
     pub sites: Vec<Site<D>>,
@@ -81,14 +81,14 @@ pub struct Model<const D: usize> {
     pub(super) ties: Ties,
     pub(super) interface: Interface,
     passing: Option<ContinuedLattice<D>>,
-    /// What interpolation lacks in elements, where elements carry the partial stress of points between their nodes.
+    /// Corrections of the interpolation in elements, where elements carry the partial stress of points between their nodes.
     pub(super) patches: FxHashMap<u32, Patch<D>>,
     /// The whole family of a lattice with plain weights, whose tensor the elements have.
     plain_lattice: Option<WholeFamily<D>>,
     spacing: f64,
     is_lattice: bool,
     volumes: Volumes,
-    /// Whether rows are the gradient of an energy.
+    /// True if rows are the gradient of an energy.
     pub(super) has_energy: bool,
     pub(super) tributary: Tributary,
     pub(super) row_scale: Option<Vec<f64>>,
@@ -101,9 +101,9 @@ pub struct Model<const D: usize> {
     pub(super) left_out: Vec<Vector<D>>,
     /// The dilatation of elements that follow the bonds of an LPS.
     pub(super) dilatation: Option<Arc<CauchyBorn<D>>>,
-    /// What the operator has worked out that the next one of the same model can use: `zones = "auto"` solves before the run does.
+    /// Results of the operator that the next one of the same model can use: `zones = "auto"` solves before the run does.
     pub(super) operator_cache: OnceLock<Box<dyn Any + Send + Sync>>,
-    /// Who has which families, where they are spread over processes.
+    /// Distribution of the families, where they are spread over processes.
     pub(super) shared: Option<SharedFamilies>,
     /// Which families a process would hold, where they can be spread over processes.
     pub(super) held: Option<HeldFamilies>,
@@ -498,7 +498,7 @@ impl<const D: usize> Model<D> {
         self.spacing
     }
 
-    /// Whether the points are those of a lattice, whatever its axes.
+    /// Returns true if the points are those of a lattice, whatever its axes.
     pub fn is_lattice(&self) -> bool {
         self.is_lattice
     }
@@ -559,12 +559,12 @@ impl<const D: usize> Model<D> {
         self.ties.ends(node)
     }
 
-    /// Whether the rows and loads of the nodes around a cell contain its share: where elements overlap into the peridynamic region, those of all cells do.
+    /// Returns true if the rows and loads of the nodes around a cell contain its share: where elements overlap into the peridynamic region, those of all cells do.
     pub fn node_takes(&self, cell: usize) -> bool {
         !self.faces_cut_bonds() || self.is_element(cell)
     }
 
-    /// Whether bonds end on the faces of elements, so that no place beyond acts on a point.
+    /// Returns true if bonds end on the faces of elements, so that no place beyond acts on a point.
     pub fn faces_cut_bonds(&self) -> bool {
         matches!(self.interface, Interface::Faces | Interface::Feet)
     }
@@ -574,7 +574,7 @@ impl<const D: usize> Model<D> {
         self.passing.as_ref()
     }
 
-    /// Whether a cell belongs to the finite elements of the model (as opposed to holding points).
+    /// Returns true if a cell belongs to the finite elements of the model (as opposed to holding points).
     pub fn is_element(&self, cell: usize) -> bool {
         self.roles[cell] != CellRole::Points && self.mesh.shapes[cell] != CellShape::Vertex
     }

@@ -20,7 +20,7 @@ use crate::{
     tensor::{Tensor4, Vector},
 };
 
-/// What bonds that end on the faces of elements need: the lattices as they go on behind the faces.
+/// Lattices continued behind the faces of elements, as needed by bonds that end on these faces.
 pub(super) struct ContinuedLattice<const D: usize> {
     /// Families of the points in elements, over the cloud of the body.
     pub families: Families,
@@ -127,7 +127,7 @@ fn check_cloud<const D: usize>(cloud: &PointCloud<D>) -> Result<(), ModelError> 
     Ok(())
 }
 
-/// How families may be spread over processes, and over which.
+/// Families held by a process where families may be spread over processes, and these processes.
 pub(super) type Spreading<'a> = (Option<HeldFamilies>, Option<&'a dyn Ranks>);
 
 impl<const D: usize> Model<D> {
@@ -242,7 +242,7 @@ impl<const D: usize> Model<D> {
         }
     }
 
-    /// Whether a position may be in the family of a Gauss point of an element that carries the partial stress.
+    /// Returns a test of whether a position may be in the family of a Gauss point of an element that carries the partial stress.
     fn near_stress_elements(&self, cloud: &PointCloud<D>) -> impl Fn(&Vector<D>, f64) -> bool {
         let boxes: Vec<(Vector<D>, Vector<D>)> = (0..self.mesh.cell_count())
             .filter(|&c| self.roles[c] == CellRole::StressElement)
@@ -446,13 +446,13 @@ pub(super) fn whole_families<const D: usize>(
     Ok(whole)
 }
 
-/// Whether two tensors agree to round-off.
+/// Returns true if two tensors agree to round-off.
 fn same_tensor<const D: usize>(a: &Tensor4<D>, b: &Tensor4<D>) -> bool {
     let size = a.get(0, 0, 0, 0).abs();
     (0..D).all(|i| (0..D).all(|j| (a.0[i][j] - b.0[i][j]).amax() <= 1e-9 * size))
 }
 
-/// How the bonds of a body are weighted.
+/// Returns the weighting of the bonds of a body.
 pub(super) fn weighting<'a, const D: usize>(
     p: &Peridynamics<D>,
     factors: &LatticeFactors<D>,
@@ -466,7 +466,7 @@ pub(super) fn weighting<'a, const D: usize>(
     }
 }
 
-/// How far families have to be complete: weights that are fitted family by family differ at both ends of a bond, so that those of the neighbours count too.
+/// Returns the extent to which families have to be complete: weights that are fitted family by family differ at both ends of a bond, so that those of the neighbours count too.
 pub(super) fn reach<const D: usize>(coupling: &dyn Coupling<D>, p: &Peridynamics<D>) -> Reach {
     match p.weights {
         BondWeights::Fitted => Reach::Neighbours,

@@ -212,12 +212,12 @@ fn shapes<const D: usize>(
 /// Bonds of a whole family with their volumes, and the moments that they have.
 type LatticeMoments<const D: usize> = (Vec<(Vector<D>, f64)>, Vec<f64>);
 
-/// How the weights of a Gauss point's family are fitted, so that its partial stress is that of the elements around under affine fields.
+/// Fit of the weights of a Gauss point's family, so that its partial stress is that of the elements around under affine fields.
 struct FamilyFit<'a, const D: usize> {
     law: &'a dyn LinearForceState<D>,
     /// Bonds and coefficients of the lattice whose tensor the elements have, where that is not the typed one.
     lattice: Option<LatticeMoments<D>>,
-    /// Whether places in elements lie between the nodes, so that fifth moments should vanish too. Where every one is a node, what the points of one element err under quadratic fields cancels around each node.
+    /// True if places in elements lie between the nodes, so that fifth moments should vanish too. If every place is a node, the errors of the points of one element under quadratic fields cancel around each node.
     between_nodes: bool,
 }
 
@@ -235,7 +235,7 @@ impl<'a, const D: usize> FamilyFit<'a, D> {
         }
     }
 
-    /// What the coefficients of a family should meet; none where the law is exact on every family.
+    /// Returns the conditions that the coefficients of a family should meet; none where the law is exact on every family.
     fn conditions(
         &self,
         bonds: &[(Vector<D>, f64)],
@@ -257,7 +257,7 @@ impl<'a, const D: usize> FamilyFit<'a, D> {
         })
     }
 
-    /// Whether weights that are not negative carry affine fields.
+    /// Returns true if non-negative weights can meet the conditions for affine fields.
     fn is_met_by_positive(&self, bonds: &[(Vector<D>, f64)], horizon: f64) -> bool {
         if let Some(law) = self.law.fitted_to(StressFit::Positive) {
             let (vectors, volumes): (Vec<_>, Vec<_>) = bonds.iter().copied().unzip();

@@ -13,7 +13,7 @@ use crate::{
 pub struct Volumes {
     /// Sum of the cells that hold points.
     pub region: f64,
-    /// What all quadrature points have of that region, including those at its edge that belong to finite elements.
+    /// Volume of that region that all quadrature points have, including those at its edge that belong to finite elements.
     pub points: f64,
 }
 
@@ -38,7 +38,7 @@ pub(super) struct PointCloud<const D: usize> {
 pub(super) struct Kept {
     /// New number of each point, `u32::MAX` for one that is dropped.
     pub renumbered: Vec<u32>,
-    /// Whether each point (by its old number) needs a family.
+    /// For each point (by its old number), true if it needs a family.
     pub active: Vec<bool>,
 }
 
@@ -149,7 +149,7 @@ fn retain_by<T>(values: &mut Vec<T>, renumbered: &[u32]) {
 }
 
 impl<const D: usize> PointCloud<D> {
-    /// Whether the points are some of a lattice along the coordinate axes.
+    /// Returns true if the points are some of a lattice along the coordinate axes.
     pub fn is_axis_parallel(&self) -> bool {
         self.axes == Some(Tensor::identity())
     }

@@ -1,4 +1,4 @@
-//! Where peridynamic points lie: in the cells that hold them and, as far as families reach, in the finite elements around.
+//! Placement of peridynamic points: in the cells that hold them and, as far as families reach, in the finite elements around.
 
 use crate::{
     coupling::{
@@ -15,7 +15,7 @@ use crate::{
     tensor::{Tensor, Vector},
 };
 
-/// How far a lattice goes on where neither its own cells nor an element are.
+/// Continuation of a lattice where neither its own cells nor an element are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Beyond {
     /// There are no points.
@@ -89,7 +89,7 @@ pub(super) fn place<const D: usize>(
     }
 }
 
-/// What placing points needs to know.
+/// Input for the placement of points.
 struct Placement<'a, const D: usize> {
     mesh: &'a Mesh<D>,
     zones: &'a [Zone],
@@ -103,7 +103,7 @@ struct Placement<'a, const D: usize> {
     /// Corners of the box that holds all points.
     low: Vector<D>,
     high: Vector<D>,
-    /// How far from the cells points are needed.
+    /// Distance from the cells, along each axis, within which points are needed.
     margin: Vector<D>,
     /// Volume of the cells that hold points.
     region: f64,

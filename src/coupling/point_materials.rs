@@ -26,7 +26,7 @@ impl<const D: usize> Model<D> {
         self.peridynamics.as_ref()?.law.several()
     }
 
-    /// Whether points may have a material.
+    /// Returns true if points may have the given material.
     pub(super) fn is_peridynamic(&self, law: &dyn Law<D>, material: u16) -> bool {
         match law.several() {
             Some(several) => several.used().contains(&material),
@@ -82,7 +82,7 @@ impl<const D: usize> Model<D> {
         }
     }
 
-    /// How far the families of points are from the constants of their material: relative differences of `C_1111`, mean and largest size, over the families of one material that
+    /// Returns the deviation of the families of points from the constants of their material: relative differences of `C_1111`, mean and largest size, over the families of one material that
     /// weigh at least 0.95 of the heaviest one; none without points.
     pub fn tensor_deviation(&self) -> Option<[f64; 2]> {
         /// Families looked at: enough for a mean.

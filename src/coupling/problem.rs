@@ -1,4 +1,4 @@
-//! What a coupled problem consists of, and why it may not make a model.
+//! Definition of a coupled problem, and the reasons why it may not make a model.
 
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ impl<const D: usize> HorizonField<D> {
     }
 }
 
-/// Where peridynamic points come from.
+/// Source of the peridynamic points.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PointSource<const D: usize> {
     /// One point per cell, at its centroid, with its volume.
@@ -80,17 +80,17 @@ pub struct Peridynamics<const D: usize> {
     pub law: Arc<dyn Law<D>>,
     /// Horizon δ \[m\].
     pub horizon: HorizonField<D>,
-    /// Where the points come from; a lattice of several has its own horizon instead.
+    /// Source of the points; a lattice of several has its own horizon instead.
     pub points: PointSource<D>,
-    /// How bonds are weighted.
+    /// Weighting of the bonds.
     pub weights: BondWeights,
-    /// What share of a cell counts that the horizon cuts; all but [`PartialVolume::Full`] need the points of a lattice.
+    /// Share that counts of a cell cut by the horizon; all but [`PartialVolume::Full`] need the points of a lattice.
     pub volumes: PartialVolume,
     /// Voids and cracks that cut bonds.
     pub barriers: Vec<Barrier<D>>,
     /// Shapes whose interior holds no points although the mesh may cover it.
     pub voids: Vec<Shape<D>>,
-    /// Whether bonds that leave the mesh are cut (holes of a mesh that no barrier describes).
+    /// Treatment of bonds that leave the mesh (holes of a mesh that no barrier describes).
     pub surfaces: Surfaces,
 }
 
@@ -103,7 +103,7 @@ impl<const D: usize> Peridynamics<D> {
         }
     }
 
-    /// How far a family of that horizon reaches \[m\]: with partial volumes farther than the horizon, since cells count whose points lie beyond it.
+    /// Returns the reach of a family of that horizon \[m\]: with partial volumes it exceeds the horizon, since cells count whose points lie beyond it.
     pub fn reach(&self, horizon: f64) -> f64 {
         let spacing = match self.points {
             PointSource::Lattice { spacing, .. } => spacing,
@@ -115,7 +115,7 @@ impl<const D: usize> Peridynamics<D> {
     }
 }
 
-/// What becomes of bonds that cross the boundary of the mesh.
+/// Treatment of bonds that cross the boundary of the mesh.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
 )]
@@ -202,13 +202,13 @@ pub(super) fn is_calibrated<const D: usize>(
     Ok(())
 }
 
-/// Why a model cannot be built.
+/// Reasons why a model cannot be built.
 #[derive(Debug, Error)]
 pub enum ModelError {
     /// A family that another process holds cannot be used; in the words of that one.
     #[error("{message}")]
     OfProcess {
-        /// What it says.
+        /// Message of that process.
         message: String,
     },
     /// A zone has no cell.
@@ -240,7 +240,7 @@ pub enum ModelError {
     /// The horizon is too small or not a number.
     #[error("the horizon is {horizon} at ({}): it must be finite and at least the spacing of the points, {spacing}, or no point has a neighbour", join(.position))]
     Horizon {
-        /// Where.
+        /// Position of the point.
         position: Vec<f64>,
         /// Its value \[m\].
         horizon: f64,
@@ -252,18 +252,18 @@ pub enum ModelError {
     Family {
         /// Point or Gauss point.
         what: &'static str,
-        /// Where.
+        /// Its position.
         position: Vec<f64>,
         /// Number of intact bonds.
         bonds: usize,
-        /// Why.
+        /// Cause.
         #[source]
         source: crate::peridynamics::PdError,
     },
     /// A family reaches over the border of two materials.
     #[error("bonds reach into another material at ({}): they would take its strain for that of the peridynamic one; keep the peridynamic and transition zones two horizons away from other materials, or use coupling.truncated, whose bonds end at the seam", join(.position))]
     OtherMaterial {
-        /// Where.
+        /// Position where this happens.
         position: Vec<f64>,
     },
     /// A node at the seam cannot be fitted.
@@ -271,7 +271,7 @@ pub enum ModelError {
     Fit {
         /// Number of the node.
         node: u32,
-        /// Where.
+        /// Position of the node.
         position: Vec<f64>,
         /// Number of sites found.
         found: usize,
@@ -284,7 +284,7 @@ pub enum ModelError {
         cell: usize,
         /// Its shape.
         shape: CellShape,
-        /// Where the node lies.
+        /// Position of the node.
         position: Vec<f64>,
         /// Its distance from the middle over the length of the edge.
         distance: f64,
@@ -292,7 +292,7 @@ pub enum ModelError {
     /// Derivatives cannot be taken at a point of the blending region.
     #[error("the point at ({}) lies where the models are blended, but its {bonds} bonds do not determine a quadratic field: widen the horizon or the body there", join(.position))]
     Derivative {
-        /// Where.
+        /// Position of the point.
         position: Vec<f64>,
         /// Number of intact bonds.
         bonds: usize,
@@ -311,7 +311,7 @@ pub enum ModelError {
     Calibration {
         /// The law's name.
         law: &'static str,
-        /// Why.
+        /// Cause.
         #[source]
         source: crate::peridynamics::softening::CalibrationError,
     },
@@ -320,9 +320,9 @@ pub enum ModelError {
         "the faces of the nonlocal zone cut the lattice where truncated bonds cannot be fitted to them: no {what} leave less than {residual:.1e} of the largest traction; let the faces follow the lattice (element edges a whole number of spacings long), use a horizon of three spacings or more or elements of two spacings or more at the seam, or couple by splice"
     )]
     Seam {
-        /// What was looked for.
+        /// Quantity that was sought.
         what: &'static str,
-        /// What remained, relative to the largest traction of a face.
+        /// Residual, relative to the largest traction of a face.
         residual: f64,
     },
     /// The conditions of a seam are more than can be met in minutes.
@@ -332,7 +332,7 @@ pub enum ModelError {
     SeamTooLarge {
         /// Conditions on the energies of bonds that the seam cuts.
         conditions: usize,
-        /// What their factorisation takes, a bound from below.
+        /// Operations of their factorisation, a lower bound.
         operations: f64,
         /// The most that it may take.
         most: f64,
@@ -367,15 +367,15 @@ pub enum ModelError {
     /// A combination that is not offered.
     #[error("{what} is not offered: {remedy}")]
     Unsupported {
-        /// What was asked for.
+        /// Requested combination.
         what: &'static str,
-        /// What to do instead.
+        /// Alternative to it.
         remedy: &'static str,
     },
 }
 
 impl ModelError {
-    /// Where it goes wrong \[m\], if a single place is known.
+    /// Returns the position of the failure \[m\], if a single place is known.
     pub fn position(&self) -> Option<&[f64]> {
         match self {
             Self::Horizon { position, .. }

@@ -35,7 +35,7 @@ pub(super) struct Patch<const D: usize> {
 impl<const D: usize> Model<D> {
     /// Expresses the points of a cloud through sites, with what interpolation lacks in elements where some lie between the nodes; `site` names that of a point that is one.
     ///
-    /// Where bonds end on faces, what lies behind them is a place only, and interpolation will do; elsewhere forces of points depend on it.
+    /// If bonds end on faces, a point behind them is a place only, and interpolation will do; elsewhere forces of points depend on it.
     pub(super) fn transfer_of(
         &self,
         sites: &Sites<'_, D>,
@@ -58,7 +58,7 @@ impl<const D: usize> Model<D> {
         (rows, patches)
     }
 
-    /// Whether points in elements that carry the partial stress, or around such, lie between the nodes.
+    /// Returns true if points in elements that carry the partial stress, or around such, lie between the nodes.
     pub fn has_places_between_nodes(&self) -> bool {
         !self.patches.is_empty()
     }
@@ -121,7 +121,7 @@ fn row<const D: usize>(
     row
 }
 
-/// What the shape functions of an element lack at `x` of each Taylor monomial of degree two, in units of `size²`.
+/// Returns the interpolation error of the shape functions of an element at `x`, for each Taylor monomial of degree two, in units of `size²`.
 fn lacking<const D: usize>(
     mesh: &Mesh<D>,
     centre: Vector<D>,
@@ -199,7 +199,7 @@ fn centre_and_size<const D: usize>(at: &Sites<'_, D>, cell: u32) -> (Vector<D>, 
     (centre, (high - low).norm() / (D as f64).sqrt())
 }
 
-/// What lies around elements.
+/// Surroundings of elements.
 struct Around<'a, const D: usize> {
     at: &'a Sites<'a, D>,
     of_node: &'a Transfer,

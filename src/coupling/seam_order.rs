@@ -11,7 +11,7 @@ use crate::{
     mesh::Mesh,
 };
 
-/// How far a mid-side node may lie from the middle of its edge, over the edge's length, where a cell is made linear.
+/// Tolerance on the distance of a mid-side node from the middle of its edge, over the edge's length, where a cell is made linear.
 const STRAIGHT: f64 = 1e-6;
 
 /// Makes linear all cells at the seam.

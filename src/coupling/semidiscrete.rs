@@ -63,20 +63,20 @@ pub struct CoupledSystem<'a, const D: usize> {
     body: Option<MovingBody<D>>,
     /// Bonds of the seam, if they are exact or break; the rows are those of the finite elements alone then.
     seam: Option<NonlinearSeam<D>>,
-    /// What partial stresses of exact bonds have beyond the rows, where elements follow the bonds.
+    /// Contribution of the partial stresses of exact bonds beyond the rows, where elements follow the bonds.
     stresses: Option<ExactStresses<D>>,
     energy: ElementEnergy,
     /// Elements whose law is not linear, if there are any.
     elements: Option<LocalElements<D>>,
     /// Free expansion of elements whose law expands by itself; none where nothing expands.
     heat: Option<FreeStretch<D>>,
-    /// Who computes which sites, where several processes do.
+    /// Distribution of the sites over processes, where several compute them.
     split: Option<split::Split<'a>>,
-    /// Whether processes may each move their own sites, by what a run asks of its steps.
+    /// True if what a run asks of its steps lets each process advance its own sites.
     is_shareable: bool,
-    /// What belongs to steps of which each process takes its own, once these have begun.
+    /// Data of steps of which each process takes its own, once these have begun.
     own_steps: Option<own_steps::OwnSteps>,
-    /// What breaking bonds has cost so far.
+    /// Dissipation by breaking bonds so far.
     spent: Dissipation,
     /// See [`SemiDiscrete::difference_length`].
     difference_length: Option<f64>,
@@ -92,7 +92,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
     /// `density` gives ρ [kg/m^D] of a material's number; `symmetry` is that of the assembled stiffness.
     ///
     /// # Errors
-    /// [`SystemError`] if the bonds cannot be passed over: a horizon that varies, a law without a kernel. A model in which nothing breaks moves as
+    /// [`SystemError`] if the bonds cannot be traversed: a horizon that varies, a law without a kernel. A model in which nothing breaks moves as
     /// [`crate::system::LinearMotion`] instead.
     pub fn new(
         model: &'a Model<D>,
@@ -212,18 +212,18 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         self.body.as_ref().map(|b| b.pass.as_ref())
     }
 
-    /// Whether the bonds that a seam cuts turn, stretch and break like others.
+    /// Returns true if the bonds that a seam cuts turn, stretch and break like others.
     pub fn has_seam_bonds(&self) -> bool {
         self.seam.is_some()
     }
 
-    /// Whether bonds can break.
+    /// Returns true if bonds can break.
     fn breaks(&self) -> bool {
         let body = self.body.as_ref();
         body.is_some_and(|b| b.failure.is_some() || b.damages)
     }
 
-    /// Whether the law remembers.
+    /// Returns true if the law has history variables.
     fn remembers(&self) -> bool {
         let elements = self.elements.as_ref();
         self.body.as_ref().is_some_and(|b| b.pass.remembers())

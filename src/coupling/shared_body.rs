@@ -71,7 +71,7 @@ impl<const D: usize> Model<D> {
         sites.iter().map(|site| of_site(site) as f64).collect()
     }
 
-    /// Whether each position lies no farther than `depth` from the box around an element that shares a node with a cell of points.
+    /// Returns, for each position, true if it lies no farther than `depth` from the box around an element that shares a node with a cell of points.
     pub(super) fn beside_elements(&self, positions: &[Vector<D>], depth: f64) -> Vec<bool> {
         let mut beside = vec![false; positions.len()];
         if depth <= 0.0 {
@@ -133,7 +133,7 @@ impl<const D: usize> Model<D> {
         Ok(body)
     }
 
-    /// Who has which families, where they are spread over processes; else every process has all.
+    /// Returns the distribution of the families, where they are spread over processes; else every process has all.
     pub fn shared_families(&self) -> Option<&SharedFamilies> {
         self.shared.as_ref()
     }
@@ -179,7 +179,7 @@ impl<const D: usize> Model<D> {
         all
     }
 
-    /// Bonds of the family of a point, whoever holds it.
+    /// Number of bonds in the family of a point, whichever process holds it.
     pub fn family_size(&self, point: usize) -> usize {
         match (&self.shared, self.body()) {
             (Some(shared), _) => shared.sizes()[point] as usize,
@@ -188,7 +188,7 @@ impl<const D: usize> Model<D> {
         }
     }
 
-    /// Whether families can be spread over processes: they are searched along a lattice, and the coupling says which of them every process needs.
+    /// Returns true if families can be spread over processes: they are searched along a lattice, and the coupling says which of them every process needs.
     pub fn can_spread_families(&self) -> bool {
         self.held.is_some()
     }
@@ -238,7 +238,7 @@ impl<const D: usize> Model<D> {
         reached
     }
 
-    /// Directed bonds of all points, whoever holds them.
+    /// Number of directed bonds of all points, whichever process holds them.
     pub fn bond_count(&self) -> usize {
         match &self.shared {
             Some(shared) => shared.bond_count(),

@@ -70,7 +70,7 @@ impl SharedFamilies {
         (site != NONE).then_some(site)
     }
 
-    /// Whether this process tells others of each point: it has the site, or is the first one, of points that are none.
+    /// Returns, for each point, true if this process reports it to others: it has the site, or is the first process, for points that are no sites.
     pub fn own(&self) -> Vec<bool> {
         let owner = |&site: &u32| match site {
             NONE => 0,
@@ -80,7 +80,7 @@ impl SharedFamilies {
         sites.map(|site| owner(site) == self.rank).collect()
     }
 
-    /// Collective: the bonds of each point in `families` over the points, whoever holds them.
+    /// Collective: returns the number of bonds of each point in `families` over the points, whichever process holds them.
     pub fn sizes_of(&self, ranks: &dyn Ranks, families: &Families) -> Vec<u32> {
         let size = |p: usize| families.of(p).len();
         let mut by_site = vec![0.0; self.partition().sites()];

@@ -57,13 +57,13 @@ impl<const D: usize> BrokenBonds<D> {
         move |i, j| of[i].is_some_and(|set| set.contains(&key(&position[j])))
     }
 
-    /// Whether there are none.
+    /// Returns true if there are no such bonds.
     pub fn is_empty(&self) -> bool {
         self.of.is_empty()
     }
 }
 
-/// Where the sites of a layout were, apart from the layout.
+/// Positions of the sites of a layout, apart from the layout.
 #[derive(Clone, Debug)]
 pub struct Carried<const D: usize> {
     position: Vec<Vector<D>>,
@@ -76,20 +76,20 @@ pub struct Carried<const D: usize> {
     spacing: f64,
 }
 
-/// Why a motion cannot go on in another layout.
+/// Error of continuing a motion in another layout.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "the zones cannot change at ({}): the {found} sites of the old zones around it do not determine an affine field there; make the zones wider, or the cells finer",
     .position.iter().map(f64::to_string).collect::<Vec<_>>().join(", ")
 )]
 pub struct CarryError {
-    /// Where.
+    /// Position of the site.
     pub position: Vec<f64>,
     /// Number of sites found.
     pub found: usize,
 }
 
-/// How the fields of one layout become those of another.
+/// Transfer of the fields of one layout to another.
 pub struct Carrying {
     rows: Transfer,
     sites: usize,
@@ -136,7 +136,7 @@ impl<const D: usize> Carried<D> {
         }
     }
 
-    /// How fields become those of `model`, which has the same mesh and lattice.
+    /// Returns the transfer of the fields to `model`, which has the same mesh and lattice.
     ///
     /// # Errors
     /// [`CarryError`] for a new site without an element, and without enough sites around to fit to.

@@ -175,7 +175,7 @@ fn pulse(model: &Model<2>) -> State {
     State::start(at(&pulse), at(&|x| -speed * slope(x)))
 }
 
-/// What a change of the zones may take, `first` being the energy at the start.
+/// Checks the changes of energy, momentum and mass when the zones change, `first` being the energy at the start.
 fn check_account(within: &str, before: &[f64; 3], now: &[f64; 3], first: f64) {
     let energy = (now[0] / before[0] - 1.0).abs();
     let momentum = (now[1] - before[1]).abs() / (first * 16.0f64.sqrt());

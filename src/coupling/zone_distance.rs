@@ -29,7 +29,7 @@ impl<'a, const D: usize> Edge<'a, D> {
         self.nearest(x, f64::INFINITY)
     }
 
-    /// Whether `x` is nearer to the edge than `limit` \[m\].
+    /// Returns true if `x` is nearer to the edge than `limit` \[m\].
     pub fn within(&self, x: &Vector<D>, limit: f64) -> bool {
         self.nearest(x, limit) < limit
     }

@@ -20,7 +20,7 @@ use crate::{
     tensor::{Tensor, Tensor4, Vector},
 };
 
-/// How bonds are weighted relative to the plain kernel.
+/// Weights of bonds relative to the plain kernel.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
 )]
@@ -62,9 +62,9 @@ pub struct PdBody<const D: usize> {
     omega: Vec<f64>,
     state: Vec<Option<StatePart<D>>>,
     pairwise: bool,
-    /// Where families end on the faces of elements, if they do.
+    /// Ends of families on the faces of elements, if families end there.
     ends: Option<FamilyEnds>,
-    /// Whether the family of each point lies with another process; empty where none does.
+    /// True for each point whose family lies with another process; empty where none does.
     elsewhere: Vec<bool>,
 }
 
@@ -88,7 +88,7 @@ pub enum Factors<'a, const D: usize> {
     Shells(&'a (dyn Fn(usize, &Vector<D>) -> f64 + Sync)),
     /// Fitted to the fourth moments, family by family.
     Fitted,
-    /// As a function of the point says.
+    /// By a function of the point.
     OfFamily(&'a FamilyFactors<'a>),
 }
 
@@ -414,7 +414,7 @@ impl<const D: usize> PdBody<D> {
         }
     }
 
-    /// What the state part of point `i` gives the bond `xi`, of these coefficients, under a uniform gradient of displacement: the blocks that multiply `∂_b u`.
+    /// Returns the state part of the force of point `i` in the bond `xi`, of these coefficients, under a uniform gradient of displacement: the blocks that multiply `∂_b u`.
     pub fn state_force_of_gradient(
         &self,
         i: usize,
@@ -472,12 +472,12 @@ impl<const D: usize> PdBody<D> {
     }
 }
 
-/// Whether the two ends of a bond give it the same coefficient.
+/// Agreement of the two ends of a bond on its coefficient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ends {
-    /// One horizon, one spacing: they do, for a pairwise law.
+    /// One horizon, one spacing: equal, for a pairwise law.
     Alike,
-    /// They may not.
+    /// They may differ.
     Differ,
 }
 

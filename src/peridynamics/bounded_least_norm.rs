@@ -5,14 +5,14 @@ use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
 /// Eigenvalues of the scaled normal equations below this fraction of the largest count as zero.
 const RANK_TOLERANCE: f64 = 1e-12;
 
-/// MomentConditions count as met when they miss by at most this fraction of the sum of magnitudes of their terms.
+/// Conditions count as met when they miss by at most this fraction of the sum of magnitudes of their terms.
 const MET_TOLERANCE: f64 = 1e-13;
 
 /// Steps of the dual Newton method; unbounded problems need two or three, bounded ones up to 8 on 60 one-sided families, where
 /// feasibility and optimum agreed with those of a linear program and a bounded least-squares solver.
 const MOST_STEPS: usize = 60;
 
-/// Whether the fitted factors are bounded from below.
+/// Lower bound of the fitted factors, if any.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bound {
     /// Any sign.
@@ -21,12 +21,12 @@ pub enum Bound {
     AtLeast(f64),
 }
 
-/// What stopped [`least_change`].
+/// Failure of [`least_change`] to meet the conditions.
 #[derive(Debug)]
 pub struct NotMet {
     /// Independent conditions.
     pub(crate) rank: usize,
-    /// Whether they can be met without the bound.
+    /// True if they can be met without the bound.
     pub(crate) unbounded_met: bool,
 }
 
@@ -57,11 +57,11 @@ fn scales(rows: &DMatrix<f64>, shares: &[f64], missing: &DVector<f64>) -> DVecto
     })
 }
 
-/// What multipliers lead to.
+/// Trial solution at given multipliers.
 struct Trial {
     /// The change of each bond.
     change: Vec<f64>,
-    /// What each condition misses then.
+    /// Residual of each condition.
     residual: DVector<f64>,
     /// Bonds that are off the bound.
     off: Vec<bool>,

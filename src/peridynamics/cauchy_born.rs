@@ -75,7 +75,7 @@ pub struct CauchyBorn<const D: usize> {
 }
 
 impl<const D: usize> CauchyBorn<D> {
-    /// Of bonds of the number `material` (0 in a body of one); `tangent` is their collapsed tensor \[Pa\]. None for a law that remembers or has no nonlinear response, and for exact bonds of one that is for small strains.
+    /// Of bonds of the number `material` (0 in a body of one); `tangent` is their collapsed tensor \[Pa\]. None for a law that has a history or no nonlinear response, and for exact bonds of one that is for small strains.
     pub fn new(
         law: &Arc<dyn Law<D>>,
         material: u16,

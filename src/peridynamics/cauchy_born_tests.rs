@@ -1,4 +1,4 @@
-//! What holds of the Cauchy–Born law of every material, by the bonds of a lattice that these tests lay out themselves.
+//! Tests of the Cauchy–Born law of every material, by the bonds of a lattice that they lay out themselves.
 
 use super::*;
 use crate::peridynamics::{Family, collapsed_tensor, laws};

@@ -12,7 +12,7 @@ const COINCIDENCE: f64 = 1e-9;
 /// Most grid cells per point, so that a sparse or elongated cloud does not buy memory with an empty grid.
 const CELLS_PER_POINT: usize = 4;
 
-/// What to do with a cloud point on which a query lies.
+/// Treatment of a cloud point on which a query lies.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Coincidence {
     /// An error: a cloud has each point once.

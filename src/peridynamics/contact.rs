@@ -7,14 +7,14 @@ use crate::{parallel, tensor::Vector};
 /// Points per task; a constant, so that no result depends on the number of threads.
 const BLOCK: usize = 256;
 
-/// What keeps points apart.
+/// Points and parameters of the contact.
 #[derive(Clone, Copy)]
 pub struct ContactSetup<'a, const D: usize> {
     /// Positions at rest \[m\].
     pub position: &'a [Vector<D>],
     /// Volumes \[m^D\].
     pub volume: &'a [f64],
-    /// Which points take part, one entry per point; empty for all.
+    /// Points that take part, one entry per point; empty for all.
     pub rows: &'a [bool],
     /// Spacing `h` of the points \[m\].
     pub spacing: f64,
@@ -22,17 +22,17 @@ pub struct ContactSetup<'a, const D: usize> {
     pub approach: f64,
     /// `k`: points closer than `d` push each other with `k (d − r) V_i V_j` \[N/m^(2D+1)\]; see [`contact_stiffness`].
     pub stiffness: f64,
-    /// How much farther than `d` pairs are kept on the list \[m\]. A quarter of the spacing is good.
+    /// Distance beyond `d` up to which pairs are kept on the list \[m\]. A quarter of the spacing is good.
     pub skin: f64,
 }
 
-/// Why there is no contact.
+/// Error in the setup of contact.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ContactError {
     /// A number that must be positive and finite is not.
     #[error("contact: {what} is {value}; give it a positive, finite value")]
     Number {
-        /// Which.
+        /// Name of the number.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -40,7 +40,7 @@ pub enum ContactError {
     /// Lists that belong together differ in length.
     #[error("contact: {what} has {length} entries for {points} points; give one per point")]
     Length {
-        /// Which list.
+        /// Name of the list.
         what: &'static str,
         /// Its length.
         length: usize,
@@ -76,7 +76,7 @@ pub struct Contact<const D: usize> {
     rebuilds: usize,
 }
 
-/// Whether an intact bond joins two points.
+/// Test for an intact bond between two points.
 pub type Bonded<'a> = dyn Fn(usize, usize) -> bool + Sync + 'a;
 
 impl<const D: usize> Contact<D> {
@@ -129,7 +129,7 @@ impl<const D: usize> Contact<D> {
         self.others.len()
     }
 
-    /// How often pairs were listed so far.
+    /// Returns the number of times that pairs were listed so far.
     pub fn rebuilds(&self) -> usize {
         self.rebuilds
     }

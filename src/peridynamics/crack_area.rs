@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 use crate::tensor::Vector;
 
-/// What area of a crack a broken bond stands for.
+/// Area of the crack that a broken bond stands for.
 ///
 /// Source: the sampling of lines by a grid that Crofton's formula allows, weights fitted to the axes and diagonals. Units: \[m^(D−1)\].
 #[derive(Clone, Copy, Debug, PartialEq)]

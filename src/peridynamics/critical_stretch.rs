@@ -1,4 +1,4 @@
-//! Critical stretch from the fracture energy: what it costs to pull a body apart along a plane, bond by bond.
+//! Critical stretch from the fracture energy: the energy of pulling a body apart along a plane, bond by bond.
 //!
 //! [`plane_energy`] sums over the bonds of the lattice at hand. [`BondEnergy::critical_stretch`] integrates over a continuous family, as papers do: at δ = m h a plane of the lattice then takes 1.25 (1D, m = 2) to 0.83 (2D, m = 2)
 //! and 0.95 to 1.09 (m = 3 to 6, 2D and 3D) of the energy that was typed.
@@ -30,13 +30,13 @@ pub enum BondEnergy {
     },
 }
 
-/// Why a fracture energy gives no critical stretch.
+/// Error of a fracture energy that gives no critical stretch.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FractureError {
     /// Not a positive, finite energy.
     #[error("the fracture energy is {energy}: it must be positive and finite")]
     Energy {
-        /// What was given \[J/m²\].
+        /// The fracture energy that was given \[J/m²\].
         energy: f64,
     },
     /// A bond that softens never stores enough.
@@ -57,9 +57,9 @@ pub enum FractureError {
     },
 }
 
-/// What two halves of a lattice take per area and square of the critical stretch, `G0/s_c²`, when they are pulled apart along a plane between two layers without being strained: the mean over planes normal to each axis.
+/// Returns the energy per area and square of the critical stretch, `G0/s_c²`, that two halves of a lattice take when they are pulled apart along a plane between two layers without being strained: the mean over planes normal to each axis.
 ///
-/// Opened by Δ, a bond ξ across the plane is stretched by `Δ ξ_n/r²` and breaks at `Δ = s_c r²/ξ_n`. What that costs is what is stored just before less what is stored just after. With bonds that act alone that is `p r⁴ s_c²` each. Of an LPS the dilatations
+/// Opened by Δ, a bond ξ across the plane is stretched by `Δ ξ_n/r²` and breaks at `Δ = s_c r²/ξ_n`. Its cost is the energy stored just before less that stored just after. With bonds that act alone that is `p r⁴ s_c²` each. Of an LPS the dilatations
 /// `Σ ω Δ ξ_n V` of the layers that the bond joins change as well, and as bonds break one after another that is not what it would be if all were stretched alike.
 ///
 /// `bonds`: the whole family of a point by integer offsets with `p` and ω of [`crate::peridynamics::linear_force_state`]; `state`: the modulus `𝓜_1111` of `½ 𝓜 (Σ ω ξ·η V)²`, zero without a state; `deviator`: [`crate::peridynamics::StatePart::deviator`]. Units: spacing \[m\] → \[J/m²\] (J/m in 2D, J in 1D).

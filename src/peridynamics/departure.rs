@@ -1,11 +1,11 @@
-//! What a law does that its linearisation does not: what finite elements and rows that keep to the linearisation lack.
+//! Departure of a law from its linearisation: the behaviour that finite elements and rows that keep to the linearisation lack.
 
 use crate::{
     material::LocalLaw,
     tensor::{Tensor, least_eigenvalue},
 };
 
-/// What a law does under a uniform strain that is reached at once and then held, and that [`crate::peridynamics::Law::linearised`] does not.
+/// Departure of a law from [`crate::peridynamics::Law::linearised`] under a uniform strain that is reached at once and then held.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Departure {
     /// Nothing, whatever the strain and the time.
@@ -14,9 +14,9 @@ pub enum Departure {
     AtStrain {
         /// The strain over that at which it begins \[1\]; nothing has begun up to 1.
         factor: f64,
-        /// What begins, as a clause: "its bonds soften".
+        /// The behaviour that begins, as a clause: "its bonds soften".
         begins: &'static str,
-        /// What makes finite elements do it too, or something like it, in words of a scene; none if nothing does.
+        /// Means by which finite elements do it too, or something like it, in words of a scene; none if there is none.
         in_elements: Option<&'static str>,
     },
     /// A loss of stress with the time.
@@ -38,7 +38,7 @@ const DIFFERENT: f64 = 0.05;
 /// Part of a linear stress up to which a difference is none: of rounding, and of large strains a millionth as large as those of the body.
 const SAME: f64 = 1e-3;
 
-/// What a local law does beyond its tangent at rest, by its response: to the strain at once, then held for a `time` \[s\].
+/// Returns the departure of a local law from its tangent at rest, by its response: to the strain at once, then held for a `time` \[s\].
 pub(crate) fn of_local_law<const D: usize>(
     law: &dyn LocalLaw<D>,
     strain: &Tensor<D>,

@@ -21,7 +21,7 @@ pub struct Families {
     pub neighbours: Vec<u32>,
 }
 
-/// Why no families were built.
+/// Error in the construction of families.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FamilyError {
     /// A coordinate is not finite.
@@ -49,17 +49,17 @@ pub enum FamilyError {
         first: usize,
         /// The higher number.
         second: usize,
-        /// Where they lie.
+        /// Their position.
         position: Vec<f64>,
     },
     /// Lists that belong together differ in length, or a list is longer than point numbers reach.
     #[error("families: {what} has {length} entries, {wanted}")]
     Length {
-        /// Which list.
+        /// Name of the list.
         what: &'static str,
         /// Its length.
         length: usize,
-        /// What was wanted.
+        /// The length that was wanted, in words.
         wanted: &'static str,
     },
 }
@@ -121,7 +121,7 @@ impl Families {
         self.offsets.len().saturating_sub(1)
     }
 
-    /// Whether there are no rows.
+    /// Returns true if there are no rows.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -218,7 +218,7 @@ impl Families {
         })
     }
 
-    /// Whether every bond has its reverse, as with a constant horizon.
+    /// Returns true if every bond has its reverse, as with a constant horizon.
     pub fn is_symmetric(&self) -> bool {
         self.one_sided().is_none()
     }

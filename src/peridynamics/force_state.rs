@@ -1,4 +1,4 @@
-//! The nonlinear response of a law: force states of deformed families, and what points and bonds remember.
+//! The nonlinear response of a law: force states of deformed families, and the history of points and bonds.
 //!
 //! A law gives the force state `T⟨ξ⟩` of one family at a time, [SAND2015-7998] eq. (2.6): the Fréchet derivative (2.3) of the energy density. [`crate::peridynamics::bond_force`] passes over all families, adds `T_i⟨ξ⟩ − T_j⟨−ξ⟩` up,
 //! breaks bonds, and keeps the history. So a law that is written here runs in load steps and in explicit motion, beside every seam, with damage, energies and checkpoints.
@@ -16,13 +16,13 @@ pub struct HistoryLayout {
     pub point: &'static [&'static str],
     /// Of each bond, seen from either end.
     pub bond: &'static [&'static str],
-    /// Where the damage of bonds is kept; none for a law whose bonds are whole until they break by their stretch.
+    /// Place of the damage of bonds among the numbers kept; none for a law whose bonds are whole until they break by their stretch.
     ///
-    /// By this results show damage. Every law says it: what it left out would pass for undamaged.
+    /// Results show damage by this. Every law states it: what it left out would pass for undamaged.
     pub damage: Option<KeptDamage>,
 }
 
-/// Which number that a law keeps is a damage, from 0 to 1.
+/// Place of a damage, from 0 to 1, among the numbers that a law keeps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum KeptDamage {
     /// The damage φ of a bond, by its place among the numbers of bonds. A bond counts as broken once φ is 1 at both of its ends.
@@ -39,7 +39,7 @@ impl HistoryLayout {
         damage: None,
     };
 
-    /// Whether nothing is kept.
+    /// Returns true if nothing is kept.
     pub fn is_empty(&self) -> bool {
         self.point.is_empty() && self.bond.is_empty()
     }
@@ -66,17 +66,17 @@ pub struct DeformedFamily<'a, const D: usize> {
     pub extension: &'a [f64],
     /// Direction `M = (ξ + η)/|ξ + η|`; with linear kinematics `ξ/|ξ|`.
     pub direction: &'a [Vector<D>],
-    /// Whether no bond of the family is broken.
+    /// True if no bond of the family is broken.
     pub is_whole: bool,
     /// Share of the family's volume whose bonds are broken, the `D = τ • φ` of [SAND2015-7998] eq. (6.28) with `τ = 1/V`.
     pub damage: f64,
-    /// `C − I` of a point that has flowed and lost bonds, which a local law is asked at: its deformation gradient is `F̄ C`, so that it does not jump where bonds break. None where there is nothing to carry.
+    /// `C − I` of a point that has flowed and lost bonds, at which a local law is evaluated: its deformation gradient is `F̄ C`, so that it does not jump where bonds break. None where there is nothing to carry.
     pub carried: Option<&'a Tensor<D>>,
-    /// Whether the point keeps the damage that it has: in a region `no-fail`, and where its row is not that of its bonds alone.
+    /// True if the point keeps the damage that it has: in a region `no-fail`, and where its row is not that of its bonds alone.
     pub keeps_damage: bool,
     /// The material of the point, 0 in a body of one.
     pub material: u16,
-    /// Whether extensions and directions are those of linear bonds.
+    /// Kinematics of the extensions and directions.
     pub kinematics: BondKinematics,
 }
 
@@ -86,7 +86,7 @@ impl<const D: usize> DeformedFamily<'_, D> {
         self.bonds.len()
     }
 
-    /// Whether no bond is intact.
+    /// Returns true if no bond is intact.
     pub fn is_empty(&self) -> bool {
         self.bonds.is_empty()
     }
@@ -147,7 +147,7 @@ impl<const D: usize> CauchyStress<D> {
     }
 }
 
-/// What a point and its intact bonds remember, by [`HistoryLayout`]: the numbers of a bond follow one another, bond after bond.
+/// History of a point and its intact bonds, by [`HistoryLayout`]: the numbers of a bond follow one another, bond after bond.
 #[derive(Clone, Copy, Debug)]
 pub struct Past<'a> {
     /// Of the point.
@@ -163,11 +163,11 @@ pub struct Present<'a> {
     pub point: &'a mut [f64],
     /// Of its bonds.
     pub bonds: &'a mut [f64],
-    /// The principal Cauchy stresses of the undamaged material \[Pa\] in any order, where a failure criterion asks for them; a law that remembers [`PLASTIC_STRAIN`] overwrites them.
+    /// The principal Cauchy stresses of the undamaged material \[Pa\] in any order, where a failure criterion asks for them; a law with the history variable [`PLASTIC_STRAIN`] overwrites them.
     pub principal_stress: Option<&'a mut [f64; 3]>,
 }
 
-/// The name of the equivalent plastic strain among what points remember.
+/// The name of the equivalent plastic strain among the history variables of points.
 pub const PLASTIC_STRAIN: &str = "equivalent plastic strain";
 
 /// Energies per volume of a point \[J/m^D\].
@@ -182,20 +182,20 @@ pub struct EnergyDensity {
 /// A response whose force state is a stress of its point, `T⟨ξ⟩ = ω P(F̄) K⁻¹ ξ (1 − D)`, and a zero-energy control.
 #[derive(Clone, Copy, Debug)]
 pub struct PointStress<'a, const D: usize> {
-    /// What gives P.
+    /// Law of the stress P.
     pub law: &'a dyn LocalLaw<D>,
-    /// What gives P where the point keeps the damage that it has, if that is another law.
+    /// Law of P where the point keeps the damage that it has, if that is another law.
     pub keeping: Option<&'a dyn LocalLaw<D>>,
-    /// What resists the rest of the deformation.
+    /// Control of the rest of the deformation.
     pub control: ZeroEnergyControl,
 }
 
 /// A law's nonlinear response.
 pub trait ForceState<const D: usize>: Send + Sync {
-    /// What it keeps. History starts at zero.
+    /// Returns the layout of its history. History starts at zero.
     fn history(&self) -> HistoryLayout;
 
-    /// Overwrites `force` with `T⟨ξ⟩` of the intact bonds at the end of a step of the length `step` \[s\], and `present` with what is remembered then; returns the energies.
+    /// Overwrites `force` with `T⟨ξ⟩` of the intact bonds at the end of a step of the length `step` \[s\], and `present` with the history then; returns the energies.
     ///
     /// A step of length zero is the response at once: nothing that takes time happens.
     fn respond(
@@ -220,17 +220,17 @@ pub trait ForceState<const D: usize>: Send + Sync {
         }
     }
 
-    /// The stress of a point, of a law whose [`ForceState::respond`] is that and nothing else: the pass then asks for it once per point instead of for a force per bond. `material` is that of the point; none asks whether all of them have one control.
+    /// The stress of a point, of a law whose [`ForceState::respond`] is that and nothing else: the pass then evaluates it once per point instead of a force per bond. `material` is that of the point; none asks whether all of them have one control.
     fn correspondence(&self, _material: Option<u16>) -> Option<PointStress<'_, D>> {
         None
     }
 
-    /// Whether a family that has lost bonds still has a response; if not, its point carries no stress of its own. Runs tell how many do.
+    /// Returns true if a family that has lost bonds still has a response; if not, its point carries no stress of its own. Runs report the number of such points.
     fn responds(&self, _family: &DeformedFamily<'_, D>) -> bool {
         true
     }
 
-    /// Whether a rotation of the family rotates its force state: only such a law takes geometrically exact bonds.
+    /// Returns true if a rotation of the family rotates its force state: only such a law takes geometrically exact bonds.
     fn is_objective(&self) -> bool;
 
     /// Energy stored in a bond at the stretch `s` over that of the linearised law, `½ c s²`: 1 for a law that is linear in the extension. By this the critical stretch follows from a fracture energy.

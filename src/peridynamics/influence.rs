@@ -105,13 +105,13 @@ pub enum InfluenceError {
     /// The degree is none of 0, 1, 3, 5, 7.
     #[error("influence function: degree n = {degree} is not offered; use 0, 1, 3, 5 or 7")]
     Degree {
-        /// What was typed.
+        /// The degree that was typed.
         degree: u32,
     },
     /// The exponent is neither 0 nor 1.
     #[error("influence function: exponent alpha = {alpha} is not offered; use 0 or 1")]
     Alpha {
-        /// What was typed.
+        /// The exponent that was typed.
         alpha: u32,
     },
 }
@@ -136,7 +136,7 @@ impl Influence {
     /// `ω(r)` of a bond of length `r > 0` in a family of horizon `delta`.
     ///
     /// A bond that touches the horizon counts as inside whatever rounding made of its length, so `r/δ` is
-    /// cut at 1 rather than tested against it; who is in the family is decided by the family.
+    /// cut at 1 rather than tested against it; membership is decided by the family.
     /// Units: r, δ \[m\] → ω [m^(−α)].
     pub fn value(self, r: f64, delta: f64) -> f64 {
         let s = (r / delta).min(1.0);

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::families::Families;
 use crate::{parallel, tensor::Vector};
 
-/// How far from its place a point may lie, in spacings: far less than lengths of bonds may differ from the horizon and still count as that.
+/// Largest distance of a point from its place, in spacings: far less than lengths of bonds may differ from the horizon and still count as that.
 const OFF_LATTICE: f64 = 1e-9;
 
 /// Most places of the table per point; a cloud that fills less of its box is searched.

@@ -1,4 +1,4 @@
-//! What a peridynamic law is to the rest of the code: a linearisation, a nonlinear response, and what breaking costs.
+//! Interface of a peridynamic law: a linearisation, a nonlinear response, and the energy of breaking bonds.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::peridynamics::{
 };
 use crate::tensor::Tensor;
 
-/// A fast pass over all bonds that computes what a law's [`ForceState`] says.
+/// A fast pass over all bonds that computes the response of a law's [`ForceState`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Accelerator {
     /// [`crate::peridynamics::bond_force::BondForce::Pairwise`].
@@ -28,13 +28,13 @@ pub trait Calibrate<const D: usize> {
     /// The law for a lattice, whatever lattice it was calibrated for before.
     ///
     /// # Errors
-    /// [`CalibrationError`] if no constants do what the material is to do.
+    /// [`CalibrationError`] if no constants meet the requirements of the material.
     fn to_lattice(
         &self,
         family: &RegularFamily<'_, D>,
     ) -> Result<Arc<dyn Law<D>>, CalibrationError>;
 
-    /// What they are, in words; none before a calibration.
+    /// Returns the constants in words; none before a calibration.
     fn found(&self) -> Option<String>;
 
     /// The stretch at which bonds cease to be elastic; none before a calibration.
@@ -62,30 +62,30 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
         None
     }
 
-    /// Whether the force with linear kinematics is that of [`Law::linearised`], whatever the displacement and the time. A law that does not say so is computed as nonlinear.
+    /// Returns true if the force with linear kinematics is that of [`Law::linearised`], whatever the displacement and the time. A law that does not say so is computed as nonlinear.
     fn is_linear(&self) -> bool {
         false
     }
 
-    /// What it does under a uniform mechanical `strain` that is reached at once and then held for a `time` \[s\], and that [`Law::linearised`] does not: finite elements without a [`Law::local_law`] do not either, nor rows at a seam. What breaks bonds by a scene's
-    /// criterion is left out. Every law says so, since nothing else would tell of elements that go on as if they were elastic.
+    /// Returns the departure from [`Law::linearised`] under a uniform mechanical `strain` that is reached at once and then held for a `time` \[s\]: finite elements without a [`Law::local_law`] and rows at a seam lack it. Bonds that break by a scene's
+    /// criterion are left out. Every law says so, since nothing else would warn of elements that go on as if they were elastic.
     fn departure(&self, strain: &Tensor<D>, time: f64) -> Departure;
 
-    /// Whether bonds can break: [`Law::force_state`] then takes families that have lost some.
+    /// Returns true if bonds can break: [`Law::force_state`] then takes families that have lost some.
     fn has_breakable_bonds(&self) -> bool;
 
-    /// Whether that holds as long as nothing is damaged, so that a seam beside undamaged bonds is in equilibrium. A law that does not say so takes part in no coupling by force.
+    /// Returns true if [`Law::is_linear`] holds as long as nothing is damaged, so that a seam beside undamaged bonds is in equilibrium. A law that does not say so takes part in no coupling by force.
     fn is_linear_until_damaged(&self) -> bool {
         self.is_linear()
     }
 
-    /// Whether its bonds lose their stiffness by a damage of their own, [`crate::peridynamics::HistoryLayout::damage`].
+    /// Returns true if its bonds lose their stiffness by a damage that it keeps, [`crate::peridynamics::HistoryLayout::damage`].
     fn damages(&self) -> bool {
         let states = self.force_state();
         states.is_some_and(|states| states.history().damage.is_some())
     }
 
-    /// How its constants follow from the lattice at hand, if they do.
+    /// Returns the calibration of its constants to the lattice at hand, if they follow from it.
     fn calibrate(&self) -> Option<&dyn Calibrate<D>> {
         None
     }
@@ -95,7 +95,7 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
         None
     }
 
-    /// What the bonds of a continuous family store, and what breaking them costs, to second order in the stretch, if that is known in closed form; `horizon` is δ \[m\].
+    /// Returns the energy stored in the bonds of a continuous family, and the energy of breaking them, to second order in the stretch, if that is known in closed form; `horizon` is δ \[m\].
     fn bond_energy(&self, horizon: f64) -> Option<BondEnergy>;
 }
 

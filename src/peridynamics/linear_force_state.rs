@@ -1,6 +1,6 @@
-//! The linearisation of a law at rest: what seams, linear statics and preconditioners know of it.
+//! The linearisation of a law at rest, for seams, linear statics and preconditioners.
 //!
-//! The linearisation of every law at rest is linear in the bond elongations `η = u(x + ξ) − u(x)`:
+//! The linearisation of every law at rest is linear in the relative displacements `η = u(x + ξ) − u(x)`:
 //!
 //! ```text
 //! T⟨ξ⟩ = p(ξ) ξ (ξ · η)  +  q ω(ξ) η  +  ω(ξ) (𝓜 : Ḡ) ξ ,      Ḡ = Σ ω η ⊗ ξ V
@@ -60,12 +60,12 @@ pub struct StatePart<const D: usize> {
     pub shape: Tensor<D>,
 }
 
-/// What the influence functions of a family that is no lattice's are to meet, beside the energy of all affine fields, so that its partial stress is that of elasticity.
+/// Conditions on the influence functions of a family that is no lattice's, beside the energy of all affine fields, so that its partial stress is that of elasticity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StressFit {
-    /// Nothing; σ is not negative.
+    /// None; σ is not negative.
     Positive,
-    /// Nothing; σ of any sign where none else meets it.
+    /// None; σ of any sign where none else meets it.
     Affine,
     /// The partial stress of quadratic fields, where a σ that is not negative meets it; else as [`StressFit::Affine`].
     Quadratic,
@@ -73,13 +73,13 @@ pub enum StressFit {
 
 /// A law linearised at rest: seams, linear statics and preconditioners are made from it.
 pub trait LinearForceState<const D: usize>: Send + Sync {
-    /// Whether bonds do not know of each other (no state part).
+    /// Returns true if bonds act independently of each other (no state part).
     fn is_pairwise(&self) -> bool;
 
-    /// Whether the force of a bond points along it.
+    /// Returns true if the force of a bond points along it.
     fn is_ordinary(&self) -> bool;
 
-    /// Whether its state parts have a [`StatePart::deviator`], which not every coupling can represent.
+    /// Returns true if its state parts have a [`StatePart::deviator`], which not every coupling can represent.
     fn has_deviators(&self) -> bool {
         false
     }
@@ -98,7 +98,7 @@ pub trait LinearForceState<const D: usize>: Send + Sync {
     /// The kernel whose fourth moment the weights of a lattice's shells are to make isotropic, at bond length `r`.
     fn kernel(&self, r: f64, horizon: f64) -> f64;
 
-    /// What the fourth moment of [`LinearForceState::kernel`] should be on a lattice; `None` if the law needs no correction.
+    /// Returns the target of the fourth moment of [`LinearForceState::kernel`] on a lattice; `None` if the law needs no correction.
     fn shell_target(&self) -> Option<ShellTarget>;
 
     /// Coefficients and moment conditions that make the partial stress exact for affine fields on any one family, whose bonds are `(ξ, V)`;

@@ -14,17 +14,17 @@
 //! | `moment_fitted_weights.rs` | moment-fitted weights of one irregular family | |
 //! | `position_aware_influence.rs` | ω and σ of a position-aware family | section 4.2 |
 //! | `shape_tensor.rs` | K and its inverse | section 7.2 |
-//! | `law.rs` | what a law is | |
-//! | `departure.rs` | what a law does that its linearisation does not | |
+//! | `law.rs` | interface of a law | |
+//! | `departure.rs` | departure of a law from its linearisation | |
 //! | `linear_force_state.rs` | its linearisation at rest; the collapsed tensor | eq. (2.10) |
-//! | `force_state.rs` | its nonlinear response, and what it remembers | eq. (2.6) |
+//! | `force_state.rs` | its nonlinear response and history | eq. (2.6) |
 //! | `laws/` | the laws, one file each | eq. (3.1), (4.11), (5.16), sections 6.2, 7.2 |
 //! | `critical_stretch.rs` | critical stretch from the fracture energy | \[Silling2005\] |
 //! | `softening.rs` | softening of bonds from strength and fracture energy | \[BazantOh1983\] |
-//! | `zero_energy.rs` | what resists the zero-energy modes of correspondence | section 6.3 |
+//! | `zero_energy.rs` | control of the zero-energy modes of correspondence | section 6.3 |
 //! | `failure/` | criteria by which bonds break, one file each | section 6.3, \[Silling2005\] |
 //! | `crack_area.rs` | area of cracks from broken bonds | |
-//! | `partial_volume/` | what share of a cell counts in a family whose horizon cuts it | section 5.2.1 |
+//! | `partial_volume/` | share of a cell in a family whose horizon cuts it | section 5.2.1 |
 //! | `body.rs`, `body/` | the body: rows of the internal force, and partial stress | eq. (2.5), (2.19) |
 //! | `cauchy_born.rs` | a law of elements with the stress of whole families | eq. (2.10) |
 //! | `memoryless_family.rs` | the stress of a family without memory | eq. (2.19) |
@@ -92,7 +92,7 @@ pub use zero_energy::ZeroEnergyControl;
 
 use crate::tensor::Vector;
 
-/// Why a family cannot carry a law.
+/// Failure of a family to carry a law.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PdError {
     /// No bond has weight.
@@ -118,6 +118,6 @@ pub struct PointError<const D: usize> {
     pub position: Vector<D>,
     /// Number of its intact bonds.
     pub bonds: usize,
-    /// Why.
+    /// Its error.
     pub source: PdError,
 }

@@ -26,7 +26,7 @@ pub struct MomentCondition<const D: usize> {
     pub value: f64,
 }
 
-/// What the moments of one family should be.
+/// Conditions on the moments of one family.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MomentConditions<const D: usize> {
     /// The conditions; consistent repetitions do no harm.
@@ -140,7 +140,7 @@ pub struct Fit {
     pub largest_factor: f64,
 }
 
-/// Why the moments of a family cannot be met.
+/// Failure to meet the moment conditions of a family.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// The bonds cannot carry the conditions: too few, or in too few directions.

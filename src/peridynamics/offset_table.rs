@@ -45,7 +45,7 @@ impl<T: Copy, const D: usize> OffsetTable<T, D> {
         self.values[self.place(offset)?]
     }
 
-    /// Where the value of an offset is; none beyond the table.
+    /// Returns the place of the value of an offset; none beyond the table.
     pub fn slot(&mut self, offset: &[i32; D]) -> Option<&mut Option<T>> {
         let place = self.place(offset)?;
         self.values.get_mut(place)

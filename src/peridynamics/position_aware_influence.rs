@@ -43,7 +43,7 @@ pub struct PositionAware {
     if *.bounded { format!("only with negative weights {rank}") } else { format!("only {rank}") }
 )]
 pub struct NotPositionAware {
-    /// What cannot be exact: `dilatation` or `deviatoric energy`.
+    /// Quantity that cannot be exact: `dilatation` or `deviatoric energy`.
     pub of: &'static str,
     /// Bonds with weight.
     pub bonds: usize,
@@ -51,9 +51,9 @@ pub struct NotPositionAware {
     pub rank: usize,
     /// Number of conditions.
     pub conditions: usize,
-    /// Whether weights of any sign would meet them.
+    /// True if weights of any sign would meet them.
     pub bounded: bool,
-    /// What helps beside a wider horizon.
+    /// Remedy beside a wider horizon.
     pub remedy: &'static str,
 }
 
@@ -104,17 +104,17 @@ pub fn fit_stress<const D: usize>(
     Ok(PositionAware { omega, sigma })
 }
 
-/// What odd moments of the influence functions are to be.
+/// Condition on the odd moments of the influence functions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Odd {
     Any,
     Vanishing,
 }
 
-/// MomentConditions on moments of even order.
+/// Conditions on moments of even order.
 #[derive(Clone, Copy)]
 struct Even<'a, const D: usize> {
-    /// What a bond of this direction adds to a condition, over its share.
+    /// Contribution of a bond of this direction to a condition, over its share.
     of_direction: &'a dyn Fn(usize, &Vector<D>) -> f64,
     wanted: &'a [f64],
 }
@@ -124,7 +124,7 @@ struct WholeFamily<'a, const D: usize> {
     family: &'a Family<'a, D>,
     base: &'a [f64],
     fields: CalibrationFields,
-    /// What helps a family that cannot be fitted, if not what helps the law.
+    /// Remedy for a family that cannot be fitted, if it is not that of the law.
     remedy: Option<&'static str>,
     directions: Vec<Vector<D>>,
     /// `ω |ξ|² V` of the base.
@@ -184,7 +184,7 @@ impl<'a, const D: usize> WholeFamily<'a, D> {
         }
     }
 
-    /// Whether there are bonds enough to expect weights with vanishing odd moments.
+    /// Returns true if there are bonds enough to expect weights with vanishing odd moments.
     fn has_enough_for_odd(&self) -> bool {
         let conditions = products::<D>(self.fields).len() + multi_indices::<D>(5).len();
         self.bonds() >= 2 * conditions

@@ -110,16 +110,16 @@ impl<const D: usize> LatticeFamily<D> {
     }
 }
 
-/// What the fourth moments of a lattice should be.
+/// Target of the fourth moments of a lattice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ShellTarget {
-    /// Isotropic with `M_1111 = 3 M_1122` of this value; a bond-based material wants `2 C_1111`.
+    /// Isotropic with `M_1111 = 3 M_1122` of this value; a bond-based material needs `2 C_1111`.
     Strength(f64),
     /// Isotropic, with the trace (for LPS, the weighted volume `m`) that the lattice has.
     Isotropy,
 }
 
-/// Why a lattice cannot be made isotropic by shells.
+/// Failure to make a lattice isotropic by shells.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShellError {
     /// The ratio δ/h gives no family.
@@ -136,11 +136,11 @@ pub enum ShellError {
          (most vanish at the horizon itself), the horizon over the spacing and the modulus"
     )]
     Input {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
         /// Its value.
         value: f64,
-        /// What it must be besides finite.
+        /// Requirement on it besides that it is finite.
         wanted: &'static str,
     },
     /// No factors of at least [`SMALLEST_SHELL_FACTOR`] meet the conditions.

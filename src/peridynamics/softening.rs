@@ -16,16 +16,16 @@ pub struct Softening {
     pub strength: f64,
     /// Fracture energy \[J/m²\].
     pub energy: f64,
-    /// Whether the force falls exponentially; along a line if not.
+    /// True if the force falls exponentially; along a line if not.
     pub is_exponential: bool,
 }
 
-/// What softening bonds of a horizon do.
+/// Calibrated softening of the bonds of a horizon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
     /// Force over stretch.
     pub envelope: Envelope,
-    /// What was typed.
+    /// The softening that was typed.
     pub typed: Softening,
     /// The largest horizon that the strength and energy allow with as many points to a horizon \[m\].
     pub largest_horizon: f64,
@@ -45,7 +45,7 @@ impl std::fmt::Display for Calibration {
     }
 }
 
-/// Why strength and energy fix no softening.
+/// Failure of a strength and an energy to fix a softening.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum CalibrationError {
     /// Bonds would snap back.

@@ -3,9 +3,9 @@
 use super::bond_force::BondKinematics;
 use crate::tensor::{Tensor, Vector};
 
-/// How the part of a family's deformation that is not uniform is resisted.
+/// Control of the part of a family's deformation that is not uniform.
 ///
-/// A correspondence stress knows the mean deformation gradient `F̄` of a family alone, so that an alternating displacement costs no energy. With `q = s D (D+2) μ/m`, the strength of the pairwise part of an LPS times `stabilisation = s`,
+/// A correspondence stress depends on the mean deformation gradient `F̄` of a family alone, so that an alternating displacement costs no energy. With `q = s D (D+2) μ/m`, the strength of the pairwise part of an LPS times `stabilisation = s`,
 /// and `m = Σ ω |ξ|² V`, each adds a force state that vanishes for uniform deformations of any size, leaves linear and angular momentum alone, and has no part in the stress:
 ///
 /// ```text
@@ -22,7 +22,7 @@ pub enum ZeroEnergyControl {
     /// Along the part of the bond that is not uniform: elastic.
     #[default]
     BondForce,
-    /// Along the deformed bond, by its length; rotations of bonds are not resisted. The force state of the report: it follows the deformation at once, but is not quite the derivative of the energy that is told of it, `½ q ω (|Y| − |F̄ ξ|)²`, since that depends on `F̄`, too.
+    /// Along the deformed bond, by its length; rotations of bonds are not resisted. The force state of the report: it follows the deformation at once, but is not quite the derivative of the energy that is reported for it, `½ q ω (|Y| − |F̄ ξ|)²`, since that depends on `F̄`, too.
     Length,
     /// Against velocities that are not uniform: dissipates, and holds no mode in place.
     Drag,
@@ -42,7 +42,7 @@ impl ZeroEnergyControl {
     }
 }
 
-/// What is left of the strength of a control whose point has the damage D, `(1 − D)⁸`.
+/// Returns the share of the strength of a control that remains at a point with the damage D, `(1 − D)⁸`.
 ///
 /// A control that is not uniform deformation alone holds the two sides of a crack together: one that faded like the stress would take as much energy again as the crack. Bars of points that were pulled to separation (a horizon of three and four spacings,
 /// a crack band of a twentieth of the widest) spent in it 0.13 to 0.30 of the fracture energy with the exponent 2, 0.02 to 0.04 with 4, and less than 0.01 with 8. It is that of the damage at the beginning of a step, so that a step's force is the derivative of an energy.

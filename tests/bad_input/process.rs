@@ -1,4 +1,4 @@
-//! What surrounds a run: files that are no files, threads, memory, and terminals that have gone.
+//! Environment of a run: files that are no files, threads, memory, and terminals that have gone.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -231,7 +231,7 @@ fn tables_of_a_scene_at_rest_are_replaced_whole() {
     }
 }
 
-/// Where the first coupling does not hold, `--output` and the warnings of parts that touch nothing are those of the scene all the same.
+/// Checks that `--output` and the warnings of parts that touch nothing are those of the scene even if the first coupling does not hold.
 #[test]
 fn the_coupling_that_is_taken_in_the_end_writes_where_it_is_told() {
     let fixtures = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("tests/fixtures");

@@ -100,7 +100,7 @@ fn wave<const D: usize>(enclosed: &Enclosed<D>, amplitude: f64) -> Vec<f64> {
         .collect()
 }
 
-/// What the rows of a case give, as runs have them: each times its scale.
+/// Returns the values of the rows of a case as runs have them: each times its scale.
 fn scaled<const D: usize>(enclosed: &Enclosed<D>, mut values: Vec<f64>) -> Vec<f64> {
     scale_rows(&enclosed.model, &mut values);
     values

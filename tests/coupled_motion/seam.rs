@@ -316,14 +316,14 @@ fn bodies_of_different_horizons_break_at_their_own_stretch() {
     }
 }
 
-/// What became of a crack one spacing above the lower face of the zone.
+/// Outcome of a crack one spacing above the lower face of the zone.
 #[derive(Debug)]
 struct Run {
-    /// What the crack has taken at the start, and at the end.
+    /// Energy that the crack has taken at the start, and at the end.
     taken: [f64; 2],
     /// The largest x of a point that has lost a third of its bonds, at the start and at the end.
     tip: [f64; 2],
-    /// Where it runs on: the mean y of the points at x > 0, weighted with their damage.
+    /// Height at which it runs on: the mean y of the points at x > 0, weighted with their damage.
     height: f64,
     /// Energy that is not accounted for, relative to what was stored.
     missing: f64,

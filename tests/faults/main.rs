@@ -80,7 +80,7 @@ impl Case {
         }
     }
 
-    /// Where a file of the folder is.
+    /// Returns the path of a file of the folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }

@@ -1,4 +1,4 @@
-//! What the proof says of rows that affine fields leave out of balance: the same at rest, where it has a matrix, and in motion, where it has none.
+//! Report of the proof on rows that affine fields leave out of balance: the same at rest, where it has a matrix, and in motion, where it has none.
 
 use crate::Case;
 
@@ -30,7 +30,7 @@ vtu = false
 
 const MOTION: &str = "\n[solve.explicit]\nduration = 1\noutputs = 1\n";
 
-/// What the proof says of affine fields, from the number of rows on: residuals before it are round-off.
+/// Returns the report of the proof on affine fields, from the number of rows on: residuals before it are round-off.
 fn rows_out_of_balance(text: &str, arguments: &[&str]) -> String {
     let summary = Case::new(text).run(arguments).expect("it runs");
     let parts = summary["proof"].as_array().expect("a proof");

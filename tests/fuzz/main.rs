@@ -1,4 +1,4 @@
-//! What fuzzing has found, replayed, and random scenes; `docs/stability.md` says how more of both is run.
+//! Replay of the inputs that fuzzing has found, and random scenes; `docs/stability.md` says how more of both is run.
 
 mod entry;
 
@@ -129,7 +129,7 @@ fn random_scenes_solve_or_are_refused_by_name() {
 
 const SOLVED: &str = "solved";
 
-/// How random scenes end, and what they take.
+/// Outcomes of random scenes, and their cost.
 struct Tally {
     text: fn(&[u8]) -> String,
     /// The scene that runs, for [`watch`].

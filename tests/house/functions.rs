@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What a reason begins with.
+/// Beginning of a reason.
 pub const REASON: &str = "// One function: ";
 
 /// A function.
@@ -14,7 +14,7 @@ pub struct Function {
     pub line: usize,
     /// From `fn` to the closing brace.
     pub lines: usize,
-    /// Why it is one function, if that is said above it.
+    /// Reason that it is one function, if that is said above it.
     pub reason: Option<String>,
 }
 

@@ -1,4 +1,4 @@
-//! What each file of the crates takes from which other, re-exports followed to the file that defines what is taken.
+//! Imports of each file of the crates from the others, re-exports followed to the file that defines what is taken.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -11,7 +11,7 @@ pub type ItemPath = Vec<String>;
 pub struct Imports {
     /// Text of each module, without comments and tests.
     code: BTreeMap<ItemPath, String>,
-    /// Where what a module exports again comes from.
+    /// Origin of each item that a module exports again.
     exports: BTreeMap<ItemPath, ItemPath>,
     /// Crates beside the library, by what stands before their modules.
     crates: BTreeSet<String>,
@@ -112,7 +112,7 @@ impl Imports {
         (path[..known].to_vec(), path.get(known).cloned())
     }
 
-    /// Which modules a module takes something from.
+    /// Returns the modules from which a module takes something.
     pub fn of(&self, module: &ItemPath) -> BTreeSet<ItemPath> {
         let code = &self.code[module];
         let mut found = BTreeSet::new();

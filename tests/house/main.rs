@@ -104,7 +104,7 @@ const SHARED_NAMES: [&str; 12] = [
     "Table",
 ];
 
-/// Where the sources of a crate lie; of the library without a name.
+/// Returns the folder of the sources of a crate; of the library without a name.
 fn folder(name: &str) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     match name {

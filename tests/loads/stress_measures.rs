@@ -86,7 +86,7 @@ pub(super) fn every_law(kinematics: Kinematics) -> Vec<Stuff> {
     all
 }
 
-/// How the body is brought into its last state.
+/// Way in which the body is brought into its last state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Way {
     AtRest,

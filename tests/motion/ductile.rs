@@ -75,7 +75,7 @@ fn a_bar_tears_where_its_plastic_strain_reaches_the_tearing_parameter() {
     accounts_for_its_energy(&path, 0.02);
 }
 
-/// What the loads did, and what moved at the start, is stored, moves, or is dissipated, to a part of it.
+/// Checks that the work of the loads and the energy at the start are stored, move, or are dissipated, to a part of it.
 fn accounts_for_its_energy(history: &std::path::Path, tolerance: f64) {
     let [kinetic, stored, work, dissipated] = [
         "kinetic_energy",

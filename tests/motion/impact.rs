@@ -418,7 +418,7 @@ output.vtu = false
     }
 }
 
-/// What a scene with an impactor says where it cannot be run, before any step.
+/// Checks the message of a scene with an impactor that cannot be run, before any step.
 // One function: the cases are a table and share nothing.
 #[test]
 fn wrong_impactors_say_what_is_wrong() {

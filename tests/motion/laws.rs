@@ -44,7 +44,7 @@ pub(crate) fn history(folder: &std::path::Path, scene: &str, columns: &[&str]) -
     columns.iter().map(|c| column(&path, c)).collect()
 }
 
-/// What a run of a scene prints as JSON.
+/// Returns the JSON that a run of a scene prints.
 pub(crate) fn summary(folder: &std::path::Path, scene: &str) -> serde_json::Value {
     write(folder, "scene.toml", scene);
     serde_json::from_str(&run(folder, &["scene.toml", "--json"])).unwrap()

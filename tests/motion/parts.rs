@@ -1,4 +1,4 @@
-//! What parts need, together: springs, sections, tables from files, stresses at probes, across restarts and threads.
+//! Tests of features that parts need, together: springs, sections, tables from files, stresses at probes, across restarts and threads.
 
 use std::path::Path;
 

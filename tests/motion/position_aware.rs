@@ -240,7 +240,7 @@ const ENERGIES: [&str; 5] = [
     "dissipated_energy",
 ];
 
-/// Whether more than a hundred bonds broke, and what was worked is stored, moves or is spent.
+/// Checks that more than a hundred bonds broke, and that the work is stored, moves or is spent.
 fn balances(found: &[Vec<f64>], what: &str) {
     let [broken, kinetic, stored, work, spent] =
         [0, 1, 2, 3, 4].map(|k: usize| *found[k].last().unwrap());

@@ -24,7 +24,7 @@ struct Enclosed<'a> {
     fields: &'a str,
     /// Size of the elements over the spacing.
     cells: usize,
-    /// Where a point of the lattice lies.
+    /// Position of a point of the lattice.
     origin: f64,
 }
 

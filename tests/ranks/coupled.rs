@@ -75,7 +75,7 @@ fn inner_plate(material: &str, coupling: &str) -> String {
     }
 }
 
-/// What is exchanged is what was predicted: ghosts of each process, no site of which it needs nothing.
+/// Checks that the exchange is the predicted one: ghosts of each process, no site of which it needs nothing.
 fn assert_predicted(text: &str, found: &Done, ranks: usize, name: &str) {
     let (traffic, steps) = &found.traffic;
     let shares = predicted(text, ranks);

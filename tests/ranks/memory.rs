@@ -1,4 +1,4 @@
-//! What each process holds, as its thread counts the bytes that it has from the allocator, and what it tells of bonds that others hold.
+//! Memory of each process, as its thread counts the bytes that it has from the allocator, and results for bonds that others hold.
 #![allow(unsafe_code)]
 
 use bondline::system::BodyState;
@@ -138,7 +138,7 @@ fn lay_out<T>(
     work(&mut system)
 }
 
-/// What is told of bonds that may lie with other processes: rows, broken bonds, energy and sums, as bits.
+/// Returns the results for bonds that may lie with other processes: rows, broken bonds, energy and sums, as bits.
 fn told(text: &str, pass: &str, ranks: Option<&dyn Ranks>) -> Vec<u64> {
     lay_out(text, ranks, |system| {
         assert_eq!(system.pass().expect("a body").name(), pass);
@@ -224,7 +224,7 @@ fn bonds_within(layers: std::ops::Range<i64>, most: i64) -> i64 {
     count
 }
 
-/// What the bonds beyond two spacings take: bytes of each process.
+/// Returns the memory of the bonds beyond two spacings: bytes of each process.
 fn bytes_of_bonds(material: &str, ranks: usize) -> Vec<f64> {
     let is_lattice = |system: &mut CoupledSystem<'_, 3>| {
         assert_eq!(system.pass().expect("a body").name(), "lattice");

@@ -12,7 +12,7 @@ use crate::{bar, plate};
 /// The fields by which a piece tells its numbers, of points and of cells.
 const IDENTIFIERS: [&str; 2] = ["GlobalPointIds", "GlobalCellIds"];
 
-/// What a reader sees of a file, or of a part of it.
+/// Contents of a file, or of a part of it, as a reader sees them.
 struct Grid {
     points: Vec<f64>,
     /// Type and points of each cell.
@@ -69,7 +69,7 @@ fn read(path: &Path) -> Vec<Grid> {
         .collect()
 }
 
-/// Whether a number of a field is that of one process.
+/// Test that a number of a field is that of one process.
 pub type Agrees<'a> = &'a dyn Fn(&str, f64, f64) -> bool;
 
 fn bits(_: &str, a: f64, b: f64) -> bool {

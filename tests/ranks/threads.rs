@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::pieces::assert_same_numbers;
 
-/// What the threads of a run share.
+/// State that the threads of a run share.
 #[derive(Debug)]
 struct Board {
     words: Mutex<Vec<Vec<u64>>>,
@@ -172,7 +172,7 @@ impl Ranks for ThreadRank {
 }
 
 impl ThreadRank {
-    /// What each thread tells.
+    /// Returns the words of all threads, each giving its own.
     fn told_to_all(&self, own: &[u64]) -> Vec<Vec<u64>> {
         self.board.words.lock().unwrap()[self.rank] = own.to_vec();
         self.board.barrier.wait();
@@ -249,7 +249,7 @@ impl RankSolver for Dense {
     }
 }
 
-/// How a scene is run.
+/// Settings of the run of a scene.
 #[derive(Clone, Copy)]
 pub struct How {
     /// Threads that are its processes; none for a run that knows of no others.
@@ -274,17 +274,17 @@ pub struct Done {
     pub gathers: usize,
     /// Its sizes, proof and warnings: what is printed of the proof, as figures end in other digits where rows are gathered.
     pub told: String,
-    /// What each process exchanged in steps, and how many of these there were, as the summary tells.
+    /// Exchange of each process in steps, and the number of these, by the summary.
     pub traffic: (Vec<Traffic>, u64),
     /// Bytes that exchanges brought to each process, as the threads count them.
     pub received: Vec<u64>,
-    /// How often each process gathered numbers of all sites, or the like.
+    /// Number of times that each process gathered numbers of all sites, or the like.
     pub of_all: usize,
     /// Solvers that each process set up.
     pub solvers: usize,
 }
 
-/// What a process tells of its run.
+/// Report of a process on its run.
 type ToldByProcess = (String, (Vec<Traffic>, u64));
 
 /// Runs a scene in a folder, or says why it did not come to its end.
@@ -362,7 +362,7 @@ pub fn run(text: &str, folder: &Path, how: How) -> Result<Done, String> {
     })
 }
 
-/// What each of some processes makes of its work.
+/// Returns the result of the work of each of some processes.
 pub fn on_processes<T: Send>(count: usize, work: impl Fn(&dyn Ranks) -> T + Sync) -> Vec<T> {
     let done = on_processes_for(count, usize::MAX, |rank| work(rank));
     done.into_iter()
@@ -442,19 +442,19 @@ fn scene(text: &str, folder: &Path) -> AnyScene {
     AnyScene::from_source(&source, folder, "scene").expect("a valid scene")
 }
 
-/// What is predicted of one process.
+/// Returns the prediction for one process.
 pub fn alone(text: &str) -> Prediction {
     let folder = folder();
     predict(scene(text, folder.path()), &Silent).expect("a prediction")
 }
 
-/// What is predicted of some processes.
+/// Returns the prediction for some processes.
 pub fn predicted(text: &str, ranks: usize) -> Processes {
     let predict = |partitioner: &dyn Ranks| predicted_by(text, ranks, Some(partitioner));
     on_processes(1, predict).remove(0)
 }
 
-/// What is predicted of some processes, with a partitioner of graphs or by bisection.
+/// Returns the prediction for some processes, with a partitioner of graphs or by bisection.
 pub fn predicted_by(text: &str, ranks: usize, partitioner: Option<&dyn Ranks>) -> Processes {
     let scene = scene(text, Path::new("."));
     processes(scene, ranks, partitioner, &Silent).expect("a prediction")

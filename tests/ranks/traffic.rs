@@ -1,4 +1,4 @@
-//! What processes exchange in steps that they share: their ghosts, as predicted, and nothing of all sites.
+//! Exchange between processes in steps that they share: their ghosts, as predicted, and nothing of all sites.
 
 use crate::memory::{COUNTS, block};
 use crate::threads::{ALONE, Done, How, assert_same, folder, predicted, predicted_by, run};

@@ -103,7 +103,7 @@ fn history(folder: &Path, scene: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     (header, rows.collect())
 }
 
-/// What a scene is refused with, on one line.
+/// Returns the message by which a scene is refused, on one line.
 fn refused(folder: &Path, scene: &str) -> String {
     let output = output(folder, scene);
     let said = String::from_utf8_lossy(&output.stderr).replace('│', " ");

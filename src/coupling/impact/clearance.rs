@@ -57,7 +57,7 @@ fn shortest_edge<const D: usize>(model: &Model<D>, site: usize) -> f64 {
 /// Nearer to the surface than this part of its size, a point is one of the first layer.
 const FIRST_LAYER: f64 = 1.0 - 1e-6;
 
-/// How far the body reaches beyond every site \[m\]: nothing at a node. A point of the first layer reaches to the surface of the mesh, any other half of its size.
+/// Returns the distance by which the body extends beyond every site \[m\]: zero at a node. A point of the first layer reaches to the surface of the mesh, any other half of its size.
 pub(super) fn clearances<const D: usize>(model: &Model<D>, sizes: &[f64]) -> Vec<f64> {
     let points: Vec<usize> = (0..model.sites.len())
         .filter(|&s| model.point_of(s).is_some())

@@ -48,7 +48,7 @@ impl<const D: usize> ImpactorShape<D> {
         self.place().norm() + radius
     }
 
-    /// How deep what reaches `clearance` beyond `x` lies inside \[m\], and the unit vector along the shortest way out; none outside, and none on a centre or an axis, from which no way is the shortest.
+    /// Returns the depth \[m\] inside of the shape of a site that extends `clearance` beyond `x`, and the unit vector along the shortest way out; none outside, and none on a centre or an axis, from which no way is the shortest.
     #[inline]
     pub fn penetration(&self, x: &Vector<D>, clearance: f64) -> Option<(f64, Vector<D>)> {
         let (from, radius) = match self {

@@ -1,4 +1,4 @@
-//! How the bonds of a moving model deform and break.
+//! Deformation and failure of the bonds of a moving model.
 
 #![deny(clippy::wildcard_enum_match_arm)]
 
@@ -19,17 +19,17 @@ pub(super) const NONE: u32 = u32::MAX;
 /// Points per task of the copies between sites and points.
 pub(super) const CHUNK: usize = 4096;
 
-/// How the bonds of a moving model behave.
+/// Behaviour of the bonds of a moving model.
 pub struct BondBehaviour<'a, const D: usize> {
-    /// Whether bonds turn with the body, or are linear in the displacement.
+    /// Kinematics of the bonds, which turn with the body or are linear in the displacement.
     pub kinematics: BondKinematics,
-    /// What breaks bonds; none if nothing does.
+    /// Threshold at which bonds break; none if nothing breaks them.
     pub failure: Option<BondThreshold>,
-    /// Where bonds never break.
+    /// Region where bonds never break.
     pub no_fail: &'a (dyn Fn(&Vector<D>) -> bool + Sync),
     /// Contact of points that no bond joins; none if they may pass through each other.
     pub contact: Option<ContactBehaviour>,
-    /// How the weights of bonds are kept; in four bytes, they are listed one by one.
+    /// Storage of the weights of bonds; in four bytes, they are listed one by one.
     pub storage: Storage,
     /// By how much points expand freely; none if nothing does, or if all bonds are linear and expand by their rows.
     pub heat: Option<FreeStretch<D>>,
@@ -60,7 +60,7 @@ pub struct FreeStretch<const D: usize> {
     pub of_cell: Arc<CellExpansion<D>>,
     /// Stretch of the solid over that within the body, of each material: 1, and 1/(1 + ν) in plane strain.
     pub solid: Vec<f64>,
-    /// Whether it changes with time.
+    /// True if it changes with time.
     pub varies_in_time: bool,
 }
 
@@ -125,7 +125,7 @@ impl BondThreshold {
     }
 }
 
-/// How points that no bond joins keep their distance.
+/// Short-range contact of points that no bond joins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactBehaviour {
     /// Part of their distance at rest to which two points may approach each other.
@@ -134,7 +134,7 @@ pub struct ContactBehaviour {
     pub stiffness: f64,
 }
 
-/// Why a model cannot move bond by bond.
+/// Reasons why a model cannot move bond by bond.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SystemError {
     /// The law has no bonds that could stretch or break one by one.
@@ -153,7 +153,7 @@ pub enum SystemError {
         /// Its name.
         law: &'static str,
     },
-    /// The bonds cannot be passed over.
+    /// The bonds cannot be traversed.
     #[error(transparent)]
     Kernel(#[from] KernelError),
     /// The contact cannot be set up.

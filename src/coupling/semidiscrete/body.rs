@@ -28,9 +28,9 @@ pub(super) struct MovingBody<const D: usize> {
     pub pass: Box<dyn BondPass<D>>,
     pub kinematics: BondKinematics,
     pub failure: Option<BondThreshold>,
-    /// How bonds expand that know their temperature; none if they do not.
+    /// Free expansion of bonds that take the temperature into account; none if they do not.
     pub heat: Option<PointHeat<D>>,
-    /// Whether the law damages bonds.
+    /// True if the law damages bonds.
     pub damages: bool,
     /// Behind a lock because its list of pairs follows the displacements it is asked for; its results do not depend on the list.
     pub contact: Option<Mutex<Contact<D>>>,
@@ -38,11 +38,11 @@ pub(super) struct MovingBody<const D: usize> {
     pub site_of_point: Vec<u32>,
     /// All points follow this many sites later, if they do.
     pub shift: Option<usize>,
-    /// How points that are no sites follow these; none where no bond and no contact asks for them.
+    /// Interpolation from the sites to points that are none; none where no bond and no contact needs it.
     pub transfer: Option<Transfer>,
     /// For each site the point whose force from the bonds it takes; `NONE` for a site that takes none.
     pub bonds_of_site: Vec<u32>,
-    /// The families that are passed over, where rows keep some bonds of their points to themselves; none if all are.
+    /// The traversed families, where rows keep some bonds of their points to themselves; none if all are traversed.
     passed: Option<Families>,
     /// Points whose force the sites take that they follow: the feet of families.
     pub feet: Vec<u32>,
@@ -76,21 +76,21 @@ fn contact_of<const D: usize>(
     Ok(contact)
 }
 
-/// What the pass over the bonds of a body is made from.
+/// Input from which the pass over the bonds of a body is made.
 struct PassInput<'a, const D: usize> {
     body: &'a PdBody<D>,
     law: &'a Arc<dyn Law<D>>,
     /// The fast pass that the law and its weights have.
     accelerator: Option<Accelerator>,
     families: &'a Families,
-    /// Whether the families are those of the body.
+    /// True if the families are those of the body.
     is_whole: bool,
-    /// Whether the force on each point counts.
+    /// For each point, true if the force on it counts.
     rows: &'a [bool],
     no_fail: &'a [bool],
     seam: Option<&'a NonlinearSeam<D>>,
     behaviour: &'a BondBehaviour<'a, D>,
-    /// Who has which families, where they are spread over processes.
+    /// Distribution of the families, where they are spread over processes.
     shared: Option<DistributedRows<'a>>,
 }
 
@@ -172,7 +172,7 @@ impl<const D: usize> PassInput<'_, D> {
     }
 }
 
-/// Who has which of the families that are passed over, where they are spread over processes: the points that this one tells of, and the bonds of each point.
+/// Distribution of the traversed families, where they are spread over processes: the points that this process reports, and the number of bonds of each point.
 struct Holders<'a> {
     ranks: &'a dyn Ranks,
     own: Vec<bool>,
@@ -203,7 +203,7 @@ impl<'a> Holders<'a> {
     }
 }
 
-/// The families that are passed over, where rows keep some bonds of their points to themselves.
+/// The traversed families, where rows keep some bonds of their points to themselves.
 fn passed_families<const D: usize>(
     model: &Model<D>,
     operator: &dyn Operator<D>,
@@ -359,13 +359,13 @@ impl<const D: usize> MovingBody<D> {
         }))
     }
 
-    /// Whether the pass knows of the bond between two points, where no seam has bonds of its own.
+    /// Returns true if the pass traverses the bond between two points, where no seam has bonds of its own.
     pub fn is_passed_over(&self, i: usize, j: u32) -> bool {
         let passed = self.passed.as_ref();
         passed.is_none_or(|families| families.of(i).binary_search(&j).is_ok())
     }
 
-    /// Whether every point that is a site takes a force from the bonds that are passed over.
+    /// Returns true if every point that is a site takes a force from the traversed bonds.
     pub fn takes_all_points(&self) -> bool {
         let mut sites = self.site_of_point.iter().filter(|site| **site != NONE);
         sites.all(|&site| self.bonds_of_site[site as usize] != NONE)

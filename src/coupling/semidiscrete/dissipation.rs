@@ -1,4 +1,4 @@
-//! What breaking bonds costs: energy stored just before less that just after, at the same displacement, and the area of the cracks.
+//! Dissipation by breaking bonds: energy stored just before less that just after, at the same displacement, and the area of the cracks.
 
 use super::CoupledSystem;
 use crate::coupling::semidiscrete::behaviour::NONE;
@@ -39,7 +39,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
         lost
     }
 
-    /// What a bond leaves of a crack where it breaks.
+    /// Returns the crack area that a bond contributes where it breaks.
     fn area_of(&self, [i, j]: [u32; 2]) -> f64 {
         self.model.body().map_or(0.0, |body| {
             let spacing = self.model.spacing_at(i);

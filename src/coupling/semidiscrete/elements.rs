@@ -16,7 +16,7 @@ use crate::{
 /// The elements around the nodes that are sites, as their rows have them.
 pub(super) struct LocalElements<const D: usize> {
     elements: NonlinearElements<D>,
-    /// Where their tangent has blocks; computed with the first one.
+    /// Sparsity pattern of their tangent; computed with the first one.
     pattern: OnceLock<TangentPattern>,
     /// Free expansion; none of elements that do not expand.
     heat: Option<ElementHeat<D>>,
@@ -141,7 +141,7 @@ impl<const D: usize> LocalElements<D> {
         });
     }
 
-    /// What the elements have beyond the linear ones in the tangent, in the rows and columns of the sites; with `is_whole` all else is linear.
+    /// Returns the tangent of the elements beyond that of the linear ones, in the rows and columns of the sites; with `is_whole` all else is linear.
     pub fn tangent(
         &self,
         model: &Model<D>,
@@ -172,7 +172,7 @@ impl<const D: usize> LocalElements<D> {
         }
     }
 
-    /// Whether a site is a node of such an element, so that its tangent changes.
+    /// Returns true if a site is a node of such an element, so that its tangent changes.
     pub fn touches(&self, model: &Model<D>, site: usize) -> bool {
         matches!(model.sites[site].kind, SiteKind::Node(n) if self.elements.is_around(n))
     }

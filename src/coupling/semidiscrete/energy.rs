@@ -48,7 +48,7 @@ impl ElementEnergy {
         Self { inner, seam, rows }
     }
 
-    /// Whether the row of a site is that of finite elements alone.
+    /// Returns true if the row of a site is that of finite elements alone.
     pub fn is_inner(&self, site: u32) -> bool {
         self.inner.binary_search(&site).is_ok()
     }

@@ -1,4 +1,4 @@
-//! What force states that are not linear tell of the sites.
+//! Nonlinear force states, evaluated at the sites: stress, energy density and history variables.
 
 use super::CoupledSystem;
 use super::behaviour::NONE;

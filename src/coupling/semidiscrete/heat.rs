@@ -10,11 +10,11 @@ use crate::{
 pub(super) struct PointHeat<const D: usize> {
     stretch: FreeStretch<D>,
     places: Vec<(Vector<D>, u16)>,
-    /// Of when the pass has it.
+    /// Time of the free stretch that the pass has.
     time: f64,
-    /// Whether the pass has it of a time of its own, and keeps it.
+    /// True while the pass keeps a free stretch that was set for another time.
     pub is_held: bool,
-    /// Whether it has had one.
+    /// True if the pass has had such a stretch, and needs that of its own time again.
     pub is_stale: bool,
 }
 

@@ -10,7 +10,7 @@ use crate::{
 const PART: f64 = 1e-3;
 
 impl<const D: usize> CoupledSystem<'_, D> {
-    /// Whether the bonds that are passed over know their temperature.
+    /// Returns true if the traversed bonds take the temperature into account.
     pub fn has_heated_bonds(&self) -> bool {
         self.body.as_ref().is_some_and(|body| body.heat.is_some())
     }
@@ -54,7 +54,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
         true
     }
 
-    /// Rows of sites without the bonds that are passed over.
+    /// Rows of sites without the traversed bonds.
     pub(super) fn rows_beside_heated_bonds(&self, sites: &[u32]) -> BlockCsr {
         assembly::assemble_apart(sites.len(), self.mass.len(), |r, row: &mut Row<D>| {
             let site = sites[r] as usize;

@@ -1,7 +1,7 @@
 //! Steps in which each process moves its own sites: bodies whose forces come from linear rows and from bonds.
 //!
 //! The force on a site takes the displacements of the columns of its row and of its neighbours, of a state-based law also those of their neighbours, for its dilatations; points between elements take those of the sites that
-//! they follow. These sites are the ghosts. Forces of own sites that others have as ghosts are computed first, and travel while the others are. Bonds that break are told to all once somebody asks.
+//! they follow. These sites are the ghosts. Forces of own sites that others have as ghosts are computed first, and travel while the others are. Bonds that break are reported to all once they are asked for.
 
 use super::behaviour::CHUNK;
 use super::reached_sites::Reached;
@@ -13,7 +13,7 @@ use crate::system::{
 use crate::tensor::Vector;
 use crate::{parallel, peridynamics::bond_force::Reach};
 
-/// What belongs to steps that processes share.
+/// Data of steps that processes share.
 pub(super) struct OwnSteps {
     own: Vec<bool>,
     /// Own sites, in chunks of [`CHUNK`].
@@ -21,7 +21,7 @@ pub(super) struct OwnSteps {
     ghosts: Ghosts,
     /// Points whose displacements are known, where not all points follow one another among the sites.
     points: Vec<u32>,
-    /// Whether forces of points are those of the sites, in their order.
+    /// True if forces of points are those of the sites, in their order.
     is_direct: bool,
     /// Bonds of own points that others do not know to be broken, and bonds of a seam.
     untold: Vec<u64>,
@@ -37,7 +37,7 @@ impl Split<'_> {
     }
 }
 
-/// What the force of a site is put together from.
+/// Contributions to the force of a site.
 struct SiteForces<'a, const D: usize> {
     linear: &'a SiteRows,
     /// See [`MovingBody::bonds_of_site`]; empty without points.
@@ -101,7 +101,7 @@ impl<const D: usize> MovingBody<D> {
 }
 
 impl<const D: usize> CoupledSystem<'_, D> {
-    /// Whether every site is a point whose force is that of its bonds, unscaled, in the order of the points.
+    /// Returns true if every site is a point whose force is that of its bonds, unscaled, in the order of the points.
     fn is_of_points_alone(&self) -> bool {
         let sites = self.mass.len();
         self.model.row_scale().is_none()

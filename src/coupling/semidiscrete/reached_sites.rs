@@ -6,7 +6,7 @@ use super::body::MovingBody;
 use crate::assembly::Transfer;
 use crate::coupling::truncated::ReachOfSeam;
 
-/// What a process has to know for the forces of its own sites.
+/// Data that a process needs for the forces of its own sites.
 pub(super) struct Reached {
     /// Points whose forces from bonds its own sites take.
     pub own_points: Vec<bool>,
@@ -14,12 +14,12 @@ pub(super) struct Reached {
     pub points: Vec<bool>,
     /// Own sites, and all whose displacements rows and bonds of own sites take.
     pub sites: Vec<bool>,
-    /// What is computed of the bonds of a seam.
+    /// Part of the bonds of a seam that is computed.
     pub seam: Option<ReachOfSeam>,
 }
 
 impl<const D: usize> CoupledSystem<'_, D> {
-    /// Whether the force of every site comes from linear rows and from bonds of which a pass can leave some to others; only bonds of a seam act beside, and nothing remembers.
+    /// Returns true if the force of every site comes from linear rows and from bonds of which a pass can leave some to others; only bonds of a seam act beside, and there are no history variables.
     pub(super) fn may_share_steps(&self) -> bool {
         let passes = |body: &MovingBody<D>| {
             body.contact.is_none()
@@ -34,7 +34,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
             && self.body.as_ref().is_none_or(passes)
     }
 
-    /// What the forces of `own` sites take.
+    /// Returns the points, sites and bonds of a seam on which the forces of `own` sites depend.
     pub(super) fn reached_from(&self, own: &[bool]) -> Reached {
         let mut sites = own.to_vec();
         for site in (0..own.len()).filter(|&site| own[site]) {

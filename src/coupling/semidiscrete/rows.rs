@@ -26,9 +26,9 @@ pub(super) struct SiteRows {
     /// The row of each site; `NONE` for a site without one.
     row_of_site: Vec<u32>,
     matrix: BlockCsr,
-    /// Whether no row feels a translation, so that a body that drifts far need not lose digits to its drift.
+    /// True if no row responds to a translation, so that a body that drifts far need not lose digits to its drift.
     is_translation_free: bool,
-    /// Whether each chunk of [`ROW_CHUNK`] rows is computed here; all are where others compute none.
+    /// For each chunk of [`ROW_CHUNK`] rows, true if it is computed here; all are where others compute none.
     computed: Option<Vec<bool>>,
     /// Of these, the chunks with rows that other processes wait for, and the others; empty before [`SiteRows::begin_with`].
     early: Vec<bool>,
@@ -157,7 +157,7 @@ impl SiteRows {
         entry(products, self.row_of_site[site]) + entry(points, point)
     }
 
-    /// Whether no site has a row.
+    /// Returns true if no site has a row.
     pub fn is_empty(&self) -> bool {
         self.matrix.rows() == 0
     }
@@ -170,7 +170,7 @@ impl SiteRows {
         }
     }
 
-    /// Whether a site has a row.
+    /// Returns true if a site has a row.
     pub fn has(&self, site: usize) -> bool {
         self.row_of_site[site] != NONE
     }

@@ -1,7 +1,7 @@
 //! The work of a step shared out among processes: each computes the forces of its own sites, and has those of the others from them.
 //!
-//! Every process has the whole model. Bonds are passed over, and rows multiplied, by the owner of their site alone; what is left (the bonds of a seam that are
-//! exact, laws without a pass of their own, energies) every process computes for itself. Forces are gathered, and broken bonds told, so that all processes
+//! Every process has the whole model. Bonds are traversed, and rows multiplied, by the owner of their site alone; what is left (the bonds of a seam that are
+//! exact, laws without a pass of their own, energies) every process computes for itself. Forces are gathered, and broken bonds reported, so that all processes
 //! have the same bits, which are those of one process.
 
 use super::behaviour::NONE;
@@ -38,7 +38,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         self
     }
 
-    /// How many processes share the work out, and why each has the sites that it has.
+    /// Returns the number of processes that share the work, and the reason for the distribution of the sites.
     pub fn distribution(&self) -> Option<(usize, &str)> {
         let split = self.split.as_ref()?;
         Some((split.ranks.count(), &split.why))

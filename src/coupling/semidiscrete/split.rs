@@ -1,20 +1,20 @@
-//! Who computes which sites of a coupled system, and what is told of bonds that break.
+//! Distribution of the sites of a coupled system over processes, and the exchange of bonds that break.
 
 use crate::peridynamics::bond_force::BondPass;
 use crate::system::{FailureUpdate, Partition, Ranks};
 
-/// Who computes which sites.
+/// Distribution of the sites over processes.
 pub(super) struct Split<'a> {
     pub ranks: &'a dyn Ranks,
     pub partition: Partition,
-    /// Why they have these.
+    /// Reason for this distribution.
     pub why: String,
-    /// Whether bonds may break.
+    /// True if bonds may break.
     pub breaks: bool,
 }
 
 impl Split<'_> {
-    /// Collective: what all passes broke, told to this one; how many bonds. None breaks while bonds are `Frozen`.
+    /// Collective: reports the bonds that all passes broke to this one; returns how many they are. None breaks while bonds are `Frozen`.
     pub fn exchange_breaks<const D: usize>(
         &self,
         pass: &mut dyn BondPass<D>,

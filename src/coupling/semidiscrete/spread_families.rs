@@ -1,4 +1,4 @@
-//! What a coupled system tells of bonds one by one, of families that may be spread over processes: each tells of its own, and all learn it.
+//! Queries of a coupled system about single bonds of families that may be spread over processes: each process reports its own, and all learn them.
 
 use super::CoupledSystem;
 use super::behaviour::NONE;
@@ -13,7 +13,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
         self.model.spread(ranks)
     }
 
-    /// Whether the pass over the bonds knows of that between two points of the cloud, or knew of it before it broke.
+    /// Returns true if the pass over the bonds contains that between two points of the cloud, or contained it before it broke.
     pub(super) fn is_passed_over(&self, i: usize, j: u32) -> bool {
         match (&self.seam, &self.body) {
             (Some(seam), _) => seam.is_whole(i, j as usize),

@@ -10,7 +10,7 @@ use crate::{
 };
 
 impl<const D: usize> CoupledSystem<'_, D> {
-    /// Energy of the bonds that the pass knows of, and of contact \[J\].
+    /// Energy of the bonds of the pass, and of contact \[J\].
     fn bond_energy(&self, u: &[f64]) -> f64 {
         self.body.as_ref().map_or(0.0, |body| {
             let mut points = vec![0.0; body.displacement.len()];

@@ -1,4 +1,4 @@
-//! Where the tangent of elements has blocks in a matrix by sites.
+//! Sparsity pattern of the tangent of elements, as blocks of a matrix by sites.
 
 use crate::{
     assembly::Transfer,

@@ -4,7 +4,7 @@ use super::simplex::Simplex;
 use crate::tensor::{Tensor, Vector};
 use rustc_hash::FxHashMap;
 
-/// What of a part is kept.
+/// Level of detail that is kept of a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detail {
     /// Its size and its centre: enough for a field that is the same everywhere.
@@ -39,7 +39,7 @@ impl<const D: usize> Moments<D> {
     }
 }
 
-/// What is known of a part while it is put together.
+/// Data of a part while it is put together.
 pub(super) struct Found<const D: usize> {
     pub size: f64,
     /// `∫ (x − middle of the cell)`.

@@ -19,16 +19,16 @@ pub(super) type Follows<const D: usize> = (u32, f64, Vector<D>);
 /// Weights this small are those of a corner on the other side of a place on a line or a plane of the lattice.
 const NO_WEIGHT: f64 = 1e-9;
 
-/// How far from the middle of a cube it still extrapolates, along each axis and in spacings.
+/// Distance from the middle of a cube up to which it still extrapolates, along each axis and in spacings.
 const FARTHEST: f64 = 1.6;
 
-/// How far from a place points are sought where no cube of the lattice is there, in spacings.
+/// Search radii for points around a place where there is no cube of the lattice, in spacings.
 const AROUND: [f64; 3] = [1.8, 2.8, 4.0];
 
-/// How far outside of an element a point may lie, over the extent of the element: hardly, or some way where it was left out.
+/// Tolerances on the distance of a point outside of an element, over the extent of the element: the first for every point, the others for points that were left out.
 const BESIDE: [f64; 5] = [1e-9, 0.05, 0.1, 0.2, 0.4];
 
-/// What a lattice point in an element is.
+/// Role of a lattice point in an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Beyond {
     /// A place that follows the nodes of the element.
@@ -126,7 +126,7 @@ impl<'a, const D: usize> Grid<'a, D> {
         Some(rows.collect())
     }
 
-    /// Whether a crack or a void hides one position from another.
+    /// Returns true if a crack or a void hides one position from another.
     fn hides(&self, x: &Vector<D>, y: &Vector<D>) -> bool {
         !self.barriers.is_empty() && self.barriers.cuts(x, y)
     }

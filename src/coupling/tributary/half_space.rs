@@ -1,4 +1,4 @@
-//! What of cells and facets lies beyond a plane, by the points of a quadrature there.
+//! Quadrature over the parts of cells and facets beyond a plane.
 
 use super::simplex::{Simplex, facet_simplices, simplices_of};
 use crate::fem;
@@ -6,7 +6,7 @@ use crate::mesh::Mesh;
 use crate::mesh::boundary::{BoundaryFacet, normal_area};
 use crate::tensor::Vector;
 
-/// What lies beyond a plane.
+/// Half-space beyond a plane.
 ///
 /// Cells and facets that the plane cuts are divided into simplices, and these by the plane: integrals of fields up to degree 3 over what lies beyond are exact where
 /// cells are straight. A facet in the plane does not lie beyond it.
@@ -20,7 +20,7 @@ pub struct HalfSpace<const D: usize> {
     pub tolerance: f64,
 }
 
-/// Where something lies.
+/// Position relative to the plane.
 #[derive(Clone, Copy, PartialEq)]
 enum Side {
     Before,
@@ -34,7 +34,7 @@ impl<const D: usize> HalfSpace<D> {
         self.normal.dot(&(x - self.point))
     }
 
-    /// Whether a place lies beyond the plane.
+    /// Returns true if a place lies beyond the plane.
     pub fn holds(&self, x: &Vector<D>) -> bool {
         self.height(x) > self.tolerance
     }

@@ -65,7 +65,7 @@ impl<const D: usize> Marks<D> {
         near
     }
 
-    /// Whether a test holds for all cells of a range.
+    /// Returns true if a test holds for all cells of a range.
     fn all(&self, from: &[i32; D], to: &[i32; D], test: &mut dyn FnMut(&[i32; D]) -> bool) -> bool {
         let mut at = *from;
         if (0..D).any(|i| from[i] > to[i]) {
@@ -120,7 +120,7 @@ impl<const D: usize> Marks<D> {
         }
     }
 
-    /// What a cell of the mesh has of the marked cells of the lattice, less voids.
+    /// Returns the pieces of a cell of the mesh in the marked cells of the lattice, less voids.
     pub fn pieces(
         &self,
         model: &Model<D>,
@@ -182,7 +182,7 @@ impl<const D: usize> Marks<D> {
     }
 }
 
-/// How often a simplex is halved that the surface of a void cuts.
+/// Maximum number of bisections of a simplex that the surface of a void cuts.
 const DEEPEST: usize = 3 * 4;
 
 /// Visits what of a simplex lies outside of voids: exactly beside boxes, by halves that are in or out beside other shapes.

@@ -108,7 +108,7 @@ impl Tributary {
     }
 }
 
-/// What the sites of a zone of several materials have of each but the first: site, material and volume.
+/// Returns the shares of each material but the first in the sites of a zone of several materials: site, material and volume.
 fn parts_of_materials<const D: usize>(model: &Model<D>, holds: &[bool]) -> Vec<(u32, u16, f64)> {
     let mut found = Vec::new();
     let used = model.several().map_or(&[][..], |several| several.used());
@@ -129,7 +129,7 @@ impl<const D: usize> Model<D> {
         &self.tributary
     }
 
-    /// What the row of each site is scaled by; none where rows are those of an energy, or all factors are one.
+    /// Returns the factors by which the row of each site is scaled; none where rows are those of an energy, or all factors are one.
     pub fn row_scale(&self) -> Option<&[f64]> {
         self.row_scale.as_deref()
     }
@@ -235,7 +235,7 @@ impl<const D: usize> Model<D> {
         own
     }
 
-    /// Whether a node of the mesh belongs to a cell that holds points.
+    /// Returns true if a node of the mesh belongs to a cell that holds points.
     pub fn touches_points(&self, node: u32) -> bool {
         let (offsets, cells) = self.node_cells();
         let own = offsets[node as usize] as usize..offsets[node as usize + 1] as usize;
@@ -243,22 +243,22 @@ impl<const D: usize> Model<D> {
         cells[own].iter().any(holds)
     }
 
-    /// Whether a node belongs to a cell and follows no ends of an edge.
+    /// Returns true if a node belongs to a cell and follows no ends of an edge.
     pub fn is_placed(&self, node: u32) -> bool {
         let offsets = self.node_cells().0;
         offsets[node as usize] < offsets[node as usize + 1] && self.ties.ends(node).is_none()
     }
 
-    /// Whether all sites that are points lie in the cells that `counts` names.
+    /// Returns true if all sites that are points lie in the cells that `counts` names.
     pub(super) fn holds_all_points(&self, counts: &[bool]) -> bool {
         (self.roles.iter().zip(counts)).all(|(&role, &counts)| counts || role != CellRole::Points)
     }
 }
 
-/// How far from a node a point may lie that is one with it, in spacings.
+/// Distance from a node within which a point coincides with it, in spacings.
 const ON_NODE: f64 = 1e-9;
 
-/// How far around the zone its lattice is continued, in spacings: farther than weights reach.
+/// Distance around the zone to which its lattice is continued, in spacings: farther than weights reach.
 const NEAR: f64 = 4.0;
 
 /// The least factor of a row: a site whose part nearly vanishes keeps an equation.

@@ -262,7 +262,7 @@ impl<const D: usize> Parts<D> {
         self.size.iter().sum()
     }
 
-    /// Whether there are no parts.
+    /// Returns true if there are no parts.
     pub fn is_empty(&self) -> bool {
         self.size.is_empty()
     }

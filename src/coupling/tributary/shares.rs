@@ -14,7 +14,7 @@ use crate::{
     tensor::Vector,
 };
 
-/// How far around a node sites are sought, over the longest edge of the cells around: farther where those found lie to one side of it.
+/// Search radii for sites around a node, over the longest edge of the cells around: larger where those found lie to one side of it.
 const REACH: [f64; 3] = [1.1, 1.6, 2.4];
 
 impl<const D: usize> Model<D> {

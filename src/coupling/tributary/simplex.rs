@@ -240,7 +240,7 @@ pub(super) fn simplices_of<const D: usize>(mesh: &Mesh<D>, c: usize) -> Vec<Simp
     }
 }
 
-/// Whether all corners of each face of a cell lie in one plane.
+/// Returns true if all corners of each face of a cell lie in one plane.
 fn has_plane_faces<const D: usize>(shape: CellShape, x: &[Vector<D>]) -> bool {
     shape.facets().iter().all(|face| {
         let e = |i: usize| x[face[i]] - x[face[0]];

@@ -6,7 +6,7 @@
 //! to 1 are taken. What a piece hands to the dilatations of an LPS is changed in the same way, without a floor: every point's dilatation is tr G, every element's a multiple of it, and their pressures balance
 //! at every site.
 //!
-//! Where the seam follows the lattice nothing is missing, and nothing is changed.
+//! If the seam follows the lattice nothing is missing, and nothing is changed.
 
 use rustc_hash::FxHashMap;
 
@@ -28,13 +28,13 @@ pub(super) const FLOOR: f64 = 0.1;
 /// Largest factor of an energy for which it is shown that none helps.
 const MOST_FACTOR: f64 = 1e3;
 
-/// What is missing in the force on a node, relative to the largest traction of a face, below which a seam follows the lattice.
+/// Missing force on a node, relative to the largest traction of a face, below which a seam follows the lattice.
 const FOLLOWS: f64 = 1e-10;
 
-/// What may be missing after a fit.
+/// Tolerance after a fit on what is missing.
 pub(super) const MET: f64 = 1e-10;
 
-/// What coordinates far from the origin leave of a force that is zero: some ulps of them over the spacing.
+/// Returns the round-off that coordinates far from the origin leave of a force that is zero: some ulps of them over the spacing.
 pub(super) fn rounding<const D: usize>(segments: &Segments<'_, D>) -> f64 {
     let (low, high) = segments.model.mesh.bounds();
     let farthest = low.abs().max().max(high.abs().max());
@@ -49,12 +49,12 @@ pub(super) enum Part {
     Bond(u32, u32),
 }
 
-/// What a part is made of.
+/// Geometry of a part.
 pub(super) struct Shape<const D: usize> {
     pub xi: Vector<D>,
     /// Its length as a fraction of the bond.
     pub length: f64,
-    /// How much of the bond it is.
+    /// Share of the bond that it is.
     pub share: f64,
     pub difference: Vec<(u32, f64)>,
 }
@@ -97,7 +97,7 @@ impl Part {
         }
     }
 
-    /// What it hands to the dilatations at its two ends, as factors of its elongation.
+    /// Returns the factors of its elongation in the dilatations at its two ends.
     fn hands<const D: usize>(&self, segments: &Segments<'_, D>) -> [f64; 2] {
         match *self {
             Self::Piece(k) => segments.cut[k].hands,
@@ -121,13 +121,13 @@ impl Part {
 pub struct SeamConditions {
     /// Number of conditions.
     pub conditions: usize,
-    /// How many are independent.
+    /// Number of independent conditions.
     pub rank: usize,
     /// Number of energies that may change: pieces, and whole bonds between points at the seam and their neighbours.
     pub unknowns: usize,
-    /// What no change of them can meet, relative to what is missing: zero if there are factors, of any sign, that meet all conditions.
+    /// Residual that no change of them can remove, relative to what is missing: zero if there are factors, of any sign, that meet all conditions.
     pub unreachable: f64,
-    /// What no factors between 0.1 and 1000 can meet, a bound from below; zero if none is found.
+    /// Residual that no factors between 0.1 and 1000 can remove, a lower bound; zero if none is found.
     pub out_of_reach: f64,
 }
 
@@ -148,7 +148,7 @@ pub(super) fn conditions<const D: usize>(segments: &mut Segments<'_, D>) -> Seam
     }
 }
 
-/// What is missing before a fit.
+/// Unmet conditions before a fit.
 struct Missing<const D: usize> {
     /// Integrals of gradients by site, as [`loaded_nodes`] gives them.
     nodes: FxHashMap<u32, Vector<D>>,

@@ -18,7 +18,7 @@ pub(super) struct Part<const D: usize> {
 }
 
 impl<const D: usize> Part<D> {
-    /// How a difference of displacement over it stretches it.
+    /// Returns the stretched state of the part under a difference of displacement over it.
     pub fn strained<const EXACT: bool>(&self, difference: &Vector<D>) -> Strained<D> {
         let d = difference / self.length;
         let s = stretched::<D, EXACT>(&self.xi, &[0.0; D], d.as_slice());

@@ -33,11 +33,11 @@ pub(super) struct Segment {
     pub stiffness: f64,
     /// Factor of its energy: 1 where the seam follows the lattice.
     pub scale: f64,
-    /// What the dilatations at its ends get of its elongation.
+    /// Factors of its elongation in the dilatations at its ends.
     pub hands: [f64; 2],
 }
 
-/// What a fit adds to a whole bond's energy, and to what it hands to the dilatations at its ends.
+/// Changes by a fit of a whole bond's energy, and of the factors of its elongation in the dilatations at its ends.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Changed {
     pub scale: f64,
@@ -56,13 +56,13 @@ pub(super) struct Segments<'a, const D: usize> {
     pub cut: Vec<Segment>,
     /// Bonds between points of the zone that are not whole, lower number first.
     pub broken: FxHashSet<(u32, u32)>,
-    /// Whether a point has a bond that is not whole, or one that a fit has changed.
+    /// For each point, true if it has a bond that is not whole, or one that a fit has changed.
     pub at_seam: Vec<bool>,
     /// Whole bonds that a fit has changed, lower number first.
     pub changed: FxHashMap<(u32, u32), Changed>,
     /// Factor of the volume of a point whose bonds a fit has changed, in the energy of its dilatation.
     pub volume: FxHashMap<u32, f64>,
-    /// Whether a fit has made the energy of an LPS a sum of squares.
+    /// True if a fit has made the energy of an LPS a sum of squares.
     pub is_squares: bool,
 }
 
@@ -148,12 +148,12 @@ impl<'a, const D: usize> Segments<'a, D> {
         wide
     }
 
-    /// Whether a point of the cloud is a site.
+    /// Returns true if a point of the cloud is a site.
     pub fn is_point(&self, i: u32) -> bool {
         self.site[i as usize] != NONE
     }
 
-    /// Whether the bond between two points of the cloud lies in the zone as a whole.
+    /// Returns true if the bond between two points of the cloud lies in the zone as a whole.
     pub fn is_whole(&self, i: u32, j: u32) -> bool {
         let at_seam = self.at_seam[i as usize] && self.at_seam[j as usize];
         self.is_point(i)
@@ -182,7 +182,7 @@ impl<'a, const D: usize> Segments<'a, D> {
         self.ends().of_materials(i, j)
     }
 
-    /// What the whole bond from `i` to `j` hands to the dilatations of the two.
+    /// Returns the factors of the elongation of the whole bond from `i` to `j` in the dilatations of the two.
     pub fn hands(&self, i: u32, j: u32) -> [f64; 2] {
         let changed = self.changed.get(&(i.min(j), i.max(j)));
         let [a, b] = changed.map_or([0.0; 2], |c| c.hands);
@@ -218,10 +218,10 @@ impl<'a, const D: usize> Segments<'a, D> {
     }
 }
 
-/// What the bonds of one point to those of higher numbers leave in the zone.
+/// Parts, within the zone, of the bonds of one point to points of higher numbers.
 #[derive(Default)]
 struct Cut {
-    /// Where the bonds go that are not whole.
+    /// Far ends of the bonds that are not whole.
     to: Vec<u32>,
     segments: Vec<Segment>,
 }
@@ -317,7 +317,7 @@ impl<const D: usize> Ends<'_, D> {
     }
 }
 
-/// What a piece hands to the dilatations at its ends.
+/// Returns the factors of a piece's elongation in the dilatations at its ends.
 ///
 /// The two add up to 2, so a uniform pressure pulls at it as at the whole bond; over the pieces of parallel bonds of a lattice the surplus of the long ones makes up for the deficit of the short ones, so that an
 /// affine field has its own dilatation everywhere.
@@ -349,7 +349,7 @@ impl WholeBonds {
         }
     }
 
-    /// Whether the bond from point `i` of the zone to point `j` is one of them.
+    /// Returns true if the bond from point `i` of the zone to point `j` is one of them.
     pub fn contains(&self, i: usize, j: usize) -> bool {
         if self.site[j] == NONE {
             return false;
@@ -370,7 +370,7 @@ pub(super) struct Springs<const D: usize> {
     origin: Vec<Origin>,
 }
 
-/// Where a spring comes from.
+/// Origin of a spring.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Origin {
     /// The points of its bond.
@@ -395,7 +395,7 @@ pub(super) struct OwnSpring<const D: usize> {
 const ROUND_OFF: f64 = 1e-14;
 
 impl<const D: usize> Springs<D> {
-    /// Whether no spring has a negative stiffness, but for what round-off leaves at the horizon, where weights vanish.
+    /// Returns true if no spring has a negative stiffness, but for round-off at the horizon, where weights vanish.
     pub fn is_positive(&self) -> bool {
         let least = -ROUND_OFF * self.stiffness.iter().copied().fold(0.0, f64::max);
         self.stiffness.iter().all(|k| *k >= least)

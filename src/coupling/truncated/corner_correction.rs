@@ -44,7 +44,7 @@ pub(super) struct EdgeCorrection<const D: usize> {
     of_site: HashMap<u32, Vec<u32>>,
 }
 
-/// How exactly an edge has to follow the lattice.
+/// Tolerance on the alignment of an edge with the lattice.
 const ALIGNED: f64 = 1e-6;
 
 /// An edge of the faces that close a zone, with the normal and the centre of each face at it.
@@ -158,12 +158,12 @@ impl<const D: usize> EdgeCorrection<D> {
         }
     }
 
-    /// Whether there are none.
+    /// Returns true if there are no strings.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
 
-    /// Whether a string ends at a site.
+    /// Returns true if a string ends at a site.
     pub fn holds(&self, site: u32) -> bool {
         self.of_site.contains_key(&site)
     }

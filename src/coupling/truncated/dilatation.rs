@@ -39,9 +39,9 @@ pub(super) enum Carrier {
 /// A functional as it grows: entries by site.
 pub(super) type Functional<const D: usize> = BTreeMap<u32, Vector<D>>;
 
-/// What all dilatations of a model have in common.
+/// Constants that all dilatations of a model have in common.
 pub(super) struct LpsConstants {
-    /// What each lattice weighs its bonds with.
+    /// Normalisation of the dilatations of each lattice.
     over_m: Vec<Normal>,
     /// K′ of the material, the same for all lattices.
     pub bulk: f64,
@@ -49,7 +49,7 @@ pub(super) struct LpsConstants {
     deviatoric: Option<f64>,
 }
 
-/// What makes dilatations of sums over a whole family.
+/// Normalisation of dilatations, as factors of sums over a whole family.
 struct Normal {
     /// `D/m`.
     volumetric: f64,
@@ -90,7 +90,7 @@ impl LpsConstants {
         }))
     }
 
-    /// Whether the law has two dilatations.
+    /// Returns true if the law has two dilatations.
     pub fn has_two_dilatations(&self) -> bool {
         self.deviatoric.is_some()
     }
@@ -157,7 +157,7 @@ impl Kernel {
         }
     }
 
-    /// What the sum of a point is multiplied with: a stiffness goes with the other as it is.
+    /// Returns the factor of the sum of a point: the stiffness of the volumetric dilatation refers to the sum as it is.
     fn of_point<const D: usize>(self, state: Option<&StatePart<D>>) -> f64 {
         match self {
             Self::Volumetric => 1.0,
@@ -171,7 +171,7 @@ fn deviatoric_of<const D: usize>(state: &StatePart<D>) -> Option<f64> {
     (state.deviator != 0.0).then(|| state.second.trace() / (D * D) as f64)
 }
 
-/// What a share of a piece's elongation adds to the volume that an element counts as its own: points on a face have half of their cells in the zone, the element carries their dilatation too.
+/// Returns the contribution of a share of a piece's elongation to the volume that an element counts as its own: points on a face have half of their cells in the zone, the element carries their dilatation too.
 pub(super) fn carried<const D: usize>(segments: &Segments<'_, D>, s: &Segment, share: f64) -> f64 {
     let xi = segments.body.bond(s.i as usize, s.j as usize);
     share * xi.norm_squared() * (s.piece.to - s.piece.from) / D as f64
@@ -285,7 +285,7 @@ impl<const D: usize> Dilatations<D> {
         self.push(-c / other, sigma.0, false);
     }
 
-    /// Whether no energy is negative but those that an element has already: a volume that pieces hand to an element may be less than none.
+    /// Returns true if no energy is negative but those that an element has already: the volume that pieces add to an element may be negative.
     pub fn is_positive(&self) -> bool {
         let all = self.stiffness.iter().zip(&self.taken_back);
         all.filter(|(_, back)| !**back).all(|(k, _)| *k >= 0.0)
@@ -338,7 +338,7 @@ fn combined<const D: usize>(
     sum
 }
 
-/// What pieces, and the whole bonds of the points around, hand to the dilatations of one influence function, and the volumes that elements count as their own.
+/// Returns the contributions of pieces, and of the whole bonds of the points around, to the dilatations of one influence function, and the volumes that elements count as their own.
 fn handed<const D: usize>(
     kernel: Kernel,
     segments: &Segments<'_, D>,
@@ -409,7 +409,7 @@ pub(super) fn state_of<'a, const D: usize>(
     }
 }
 
-/// Whether the state of a law is its dilatation alone: `𝓜 ∝ I ⊗ I`, no stabilisation.
+/// Returns true if the state of a law is its dilatation alone: `𝓜 ∝ I ⊗ I`, no stabilisation.
 fn is_volumetric<const D: usize>(state: &StatePart<D>) -> bool {
     let factor = state.modulus.get(0, 0, 0, 0);
     state.stabilisation == 0.0

@@ -225,7 +225,7 @@ impl<const D: usize> States<D> {
         })
     }
 
-    /// What the pressures make a part pull with, per elongation.
+    /// Returns the tension of a part under the pressures, conjugate to its elongation.
     pub fn tension(&self, part: usize, pressures: &[f64]) -> f64 {
         let of = self.of_part(part).iter();
         of.map(|&(f, c)| c * pressures[f as usize]).sum()

@@ -9,7 +9,7 @@ use crate::{coupling::sparse_factors::SparseFactors, parallel};
 /// Conditions from which on their normal equations are factorised: conjugate gradients alone take as many iterations as a long seam has points.
 const FACTORISED: usize = 300;
 
-/// What is added to the diagonal of those, whose entries are 1: conditions may follow from each other.
+/// Regularisation added to the diagonal of the normal equations, whose entries are 1: conditions may follow from each other.
 const REGULAR: f64 = 1e-8;
 
 /// Conditions up to which factors of a step are dense.

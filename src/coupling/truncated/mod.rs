@@ -5,7 +5,7 @@
 //! | `seam.rs` | the faces of the peridynamic zone, and the pieces of a bond inside of it |
 //! | `bond_segments.rs` | pieces with their ends, and their springs |
 //! | `nonlinear_bonds.rs`, `bond_kinematics.rs` | pieces that turn, stretch and break |
-//! | `dilatation.rs` | what pieces hand to the dilatations of an LPS |
+//! | `dilatation.rs` | contributions of pieces to the dilatations of an LPS |
 //! | `dilatation_state.rs` | those dilatations where pieces turn, stretch and break |
 //! | `element_dilatation.rs` | those of elements that follow the bonds |
 //! | `corner_correction.rs` | strings along the edges of a zone in 3D |
@@ -68,17 +68,17 @@ use crate::{
 /// Source: none; derived in `docs/truncated.md`. A transition zone, if the scene has one, is local. Pairwise laws, LPS and position-aware solids on a regular lattice with one horizon.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Truncated {
-    /// What becomes in motion of the bonds that the seam cuts.
+    /// Treatment in motion of the bonds that the seam cuts.
     pub cut_bonds: CutBonds,
 }
 
-/// What becomes in motion of bonds that the seam cuts, where bonds are exact or break.
+/// Treatment in motion of bonds that the seam cuts, where bonds are exact or break.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CutBonds {
     /// They turn, stretch and break like others.
     #[default]
     Breaking,
-    /// They are rows of a matrix, which is cheaper. Damage that comes within two horizons of the seam is told.
+    /// They are rows of a matrix, which is cheaper. Damage that comes within two horizons of the seam is reported.
     Linear,
 }
 
@@ -216,7 +216,7 @@ struct TruncatedRows<'a, const D: usize> {
     pieces: Arc<Pieces<D>>,
 }
 
-/// What becomes of the bonds of the points at the seam.
+/// Decomposition of the bonds of the points at the seam.
 struct Pieces<const D: usize> {
     /// Those of a pairwise law that are whole, and the body's; the others are springs. With dilatations all are springs.
     whole: Option<WholeBonds>,
@@ -225,9 +225,9 @@ struct Pieces<const D: usize> {
     strings: EdgeCorrection<D>,
     /// Points whose rows are not those of the body alone.
     listed: Vec<bool>,
-    /// Whether dilatations have a stiffness that is not negative.
+    /// True if no dilatation has a negative stiffness.
     squares: bool,
-    /// Whether dilatations by two influence functions are taken from one another.
+    /// True if dilatations by two influence functions are subtracted from one another.
     has_two_dilatations: bool,
 }
 

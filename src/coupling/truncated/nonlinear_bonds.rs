@@ -4,7 +4,7 @@
 //! passes the critical stretch: its ends move with their points, or with the elements that they lie in (`breaking.rs`). The elements behind the face keep their classical energy: a crack cannot go on into them.
 //!
 //! Of an LPS a piece also hands its elongation to dilatations (`dilatation_state.rs`). The energies of the points at the seam, halves of whole bonds and dilatations, are then here too, and the body's pass computes the others;
-//! whole bonds break there, and are told here.
+//! whole bonds break there, and are reported here.
 
 mod breaking;
 mod construction;
@@ -73,12 +73,12 @@ pub struct NonlinearSeam<const D: usize> {
     elongation: Vec<f64>,
     /// Of each of `sites`, kept between passes.
     sums: Vec<[f64; D]>,
-    /// What is computed here, where several processes move the sites.
+    /// Bonds and dilatations that are computed here, where several processes move the sites.
     computed: OwnBonds,
 }
 
 impl<const D: usize> NonlinearSeam<D> {
-    /// How bonds follow the motion.
+    /// Sets the kinematics of the bonds.
     pub(in crate::coupling) fn follow_motion(&mut self, kinematics: BondKinematics) {
         self.kinematics = kinematics;
     }
@@ -122,7 +122,7 @@ impl<const D: usize> NonlinearSeam<D> {
         &self.families
     }
 
-    /// Whether the body's own pass knows of the bond between two points.
+    /// Returns true if the body's own pass contains the bond between two points.
     pub(in crate::coupling) fn is_whole(&self, i: usize, j: usize) -> bool {
         self.families.of(i).binary_search(&(j as u32)).is_ok()
     }
@@ -348,7 +348,7 @@ impl<const D: usize> NonlinearSeam<D> {
         }
     }
 
-    /// Whether a bond of the seam ends at a site, or changes a dilatation that knows of it.
+    /// Returns true if a bond of the seam ends at a site, or changes a dilatation that depends on it.
     pub(in crate::coupling) fn touches(&self, site: usize) -> bool {
         let states = self.states.as_ref();
         !self.ends_at(site).is_empty() || states.is_some_and(|s| !s.of_site(site).is_empty())
@@ -387,12 +387,12 @@ impl<const D: usize> NonlinearSeam<D> {
         self.last.clear();
     }
 
-    /// Whether a bond of the seam broke in the last pass.
+    /// Returns true if a bond of the seam broke in the last pass.
     pub(in crate::coupling) fn has_broken(&self) -> bool {
         !self.last.is_empty()
     }
 
-    /// Adds to the damage of points, so far that of the bonds that the body's pass knows of, what they lost here; `of_bonds` is the volume that a point's whole bonds reach.
+    /// Adds to the damage of points, so far that of the bonds of the body's pass, what they lost here; `of_bonds` is the volume that a point's whole bonds reach.
     pub(in crate::coupling) fn add_damage(
         &self,
         damage: &mut [f64],

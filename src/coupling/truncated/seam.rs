@@ -8,7 +8,7 @@ use crate::{
     tensor::Vector,
 };
 
-/// How near, relative to the size of a bin of faces, a position is on a face.
+/// Distance, relative to the size of a bin of faces, within which a position is on a face.
 const ON_FACE: f64 = 1e-9;
 
 /// Distance of probes from a bond that touches faces, edges or corners, relative to the size of a bin.
@@ -25,11 +25,11 @@ const SAME: f64 = 1e-8;
 /// A piece of a bond inside of the peridynamic zone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Piece {
-    /// Where it starts, as a fraction of the bond.
+    /// Start of the piece, as a fraction of the bond.
     pub from: f64,
-    /// Where it ends.
+    /// End of the piece, as a fraction of the bond.
     pub to: f64,
-    /// How much of the bond runs there: less than 1 for a bond within a face or an edge of the zone, or through an edge.
+    /// Share of the bond that runs there: less than 1 for a bond within a face or an edge of the zone, or through an edge.
     pub share: f64,
 }
 
@@ -41,7 +41,7 @@ impl Piece {
         share: 1.0,
     };
 
-    /// What is inside of the zone of a bond that is not outside as a whole; of one that is cut, the first part or the last.
+    /// Returns the piece, inside of the zone, of a bond that is not outside as a whole; of one that is cut, the first part or the last.
     pub fn of(course: Course, is_first: bool) -> Self {
         match (course, is_first) {
             (Course::Cut(to), true) => Self { to, ..Self::WHOLE },
@@ -66,13 +66,13 @@ struct Face<const D: usize> {
 }
 
 impl<const D: usize> Face<D> {
-    /// Whether its box meets another.
+    /// Returns true if its box meets another.
     fn may_meet(&self, low: &Vector<D>, high: &Vector<D>) -> bool {
         (0..D).all(|i| low[i] <= self.high[i] && high[i] >= self.low[i])
     }
 }
 
-/// How a bond runs, where a look at the faces tells.
+/// Course of a bond, as far as the faces determine it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Course {
     /// Inside of the zone.
@@ -85,7 +85,7 @@ pub(super) enum Course {
     Unclear,
 }
 
-/// What a cell is to a lattice.
+/// Relation of a cell to a lattice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Side {
     /// It holds points of the lattice.
@@ -96,7 +96,7 @@ pub(super) enum Side {
     Other,
 }
 
-/// What each cell of a model is to a lattice.
+/// Returns the relation of each cell of a model to a lattice.
 pub(super) fn sides<const D: usize>(model: &Model<D>, lattice: usize) -> Vec<Side> {
     (0..model.mesh.cell_count())
         .map(|c| match model.lattice_of_cell(c) {
@@ -120,7 +120,7 @@ pub(super) struct Seam<'a, const D: usize> {
     zone: Locator<D>,
 }
 
-/// Where a bond ends on faces: the nodes with their weights, and the elements behind.
+/// End of a bond on faces: the nodes with their weights, and the elements behind.
 #[derive(Clone, Debug)]
 pub(super) struct Foot {
     /// Sites and weights of the trace of the displacement.
@@ -220,14 +220,14 @@ impl<'a, const D: usize> Seam<'a, D> {
         faces.filter(move |face| face.may_meet(&low, &high))
     }
 
-    /// Whether `x` lies on one of the faces.
+    /// Returns true if `x` lies on one of the faces.
     fn touches(&self, x: &Vector<D>, faces: &[u32]) -> bool {
         let distance = |face: &Face<D>| self.model.mesh.distance_to_facet(x, &face.nodes);
         self.meeting(x, x, faces)
             .any(|face| distance(face) <= ON_FACE * self.size)
     }
 
-    /// How the bond from `a` to `b` runs, as far as its ends and the faces tell: of each end, whether it is a point of the zone.
+    /// Returns the course of the bond from `a` to `b`, as far as its ends and the faces determine it; `is_site` is true for an end that is a point of the zone.
     ///
     /// Between two cuts a bond is inside or outside of the zone as a whole, and at an end that lies on no face it is what this end is.
     pub fn course(
@@ -362,12 +362,12 @@ impl<'a, const D: usize> Seam<'a, D> {
         pieces.sort_unstable_by(|p, q| p.from.total_cmp(&q.from).then(p.to.total_cmp(&q.to)));
     }
 
-    /// Whether a bond of a point can meet a face at all.
+    /// Returns true if a bond of a point can meet a face at all.
     pub fn is_around(&self, x: &Vector<D>) -> bool {
         self.around.contains(&bin_of(x, self.size))
     }
 
-    /// Whether a bond can meet a face at all.
+    /// Returns true if a bond can meet a face at all.
     pub fn near(&self, a: &Vector<D>, b: &Vector<D>) -> bool {
         let mut found = false;
         for_box(
@@ -422,7 +422,7 @@ fn add(pieces: &mut Vec<Piece>, from: f64, to: f64, share: f64) {
     }
 }
 
-/// Where the bond from `a` to `b` passes a point (1D), an edge (2D) or a triangle (3D), as a fraction; none if it runs in its plane.
+/// Returns the fraction at which the bond from `a` to `b` passes a point (1D), an edge (2D) or a triangle (3D); none if it runs in its plane.
 fn crossing<const D: usize>(
     a: &Vector<D>,
     b: &Vector<D>,
@@ -441,7 +441,7 @@ fn crossing<const D: usize>(
     (beyond_edges(&(a + (b - a) * t), corners, normal) <= tolerance).then_some(t)
 }
 
-/// How far a place in the plane of a point (1D), an edge (2D) or a triangle (3D) lies beyond its ends, \[m\]; negative inside of them.
+/// Returns the distance \[m\] by which a place in the plane of a point (1D), an edge (2D) or a triangle (3D) lies beyond its ends; negative inside of them.
 fn beyond_edges<const D: usize>(
     x: &Vector<D>,
     corners: &[Vector<D>; D],

@@ -42,13 +42,13 @@ const MOST_DIRECT_STEPS: usize = 60;
 /// Most conditions for such steps: each takes seconds beyond.
 const MOST_DIRECT: usize = 6000;
 
-/// What may be left of the target, relative, where no second search is needed.
+/// Residual of the target, relative, below which no second search is needed.
 const MET: f64 = 1e-12;
 
-/// What two searches may leave of the target, relative, where a longer one is made.
+/// Residual of the target after two searches, relative, up to which a longer one is made.
 const NEARLY_MET: f64 = 1e-3;
 
-/// How the steps of Newton's method are found.
+/// Computation of the steps of Newton's method.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Steps {
     /// By conjugate gradients, led by the factors of the equations of all changes.
@@ -67,16 +67,16 @@ struct Found {
     /// The norm of what it leaves.
     left: f64,
     change: Vec<f64>,
-    /// Whether changes that meet the conditions are shown to be far too large.
+    /// True if changes that meet the conditions are shown to be far too large.
     is_far: bool,
 }
 
-/// Where Newton's method for the dual stands.
+/// Iterate of Newton's method for the dual.
 struct DualPoint {
     multiplier: Vec<f64>,
     /// The changes before floors.
     z: Vec<f64>,
-    /// What the conditions miss.
+    /// Residual of the conditions.
     gap: Vec<f64>,
 }
 
@@ -141,7 +141,7 @@ impl Conditions {
             .zip(self.values[range].iter().copied())
     }
 
-    /// What changes add to every condition.
+    /// Returns the contribution of changes to every condition.
     pub fn sum(&self, change: &[f64]) -> Vec<f64> {
         let mut sum = vec![0.0; self.count];
         for (k, &x) in change.iter().enumerate() {
@@ -154,7 +154,7 @@ impl Conditions {
         sum
     }
 
-    /// What brings every row to the norm 1; nothing to rows of zeros.
+    /// Returns the factors that bring every row to the norm 1; zero for rows of zeros.
     fn row_scale(&self) -> Vec<f64> {
         let mut size = vec![0.0f64; self.count];
         for (&r, v) in self.rows.iter().zip(&self.values) {
@@ -175,7 +175,7 @@ impl Conditions {
         (scaled, target.collect())
     }
 
-    /// What changes leave of what is wanted.
+    /// Returns the residual of the target under changes.
     fn left(&self, target: &[f64], change: &[f64]) -> Vec<f64> {
         let sum = self.sum(change);
         target.iter().zip(sum).map(|(t, s)| t - s).collect()

@@ -30,10 +30,10 @@ const MOST_OPERATIONS: f64 = 3e11;
 /// A stiffness below this part of the largest is round-off.
 const NOTHING: f64 = 1e-12;
 
-/// How much of a trace may change for the price at which a factor doubles.
+/// Change of a trace at the cost of doubling a factor.
 const SHIFTED: f64 = 0.5;
 
-/// What changes: the energy of a part, or that which one of its two ends gets of it.
+/// Unknown of the fit: the energy of a part, or the share of it that one of its two ends gets.
 struct Column {
     part: usize,
     /// The end that gets it, with its point.
@@ -44,7 +44,7 @@ struct Column {
 
 /// Fits a pairwise law with one factor for each part, or an LPS with one for each end of a part; returns what is left, relative to the largest traction.
 ///
-/// Where that is more than round-off the factors are of no use.
+/// If that is more than round-off the factors are of no use.
 ///
 /// # Errors
 /// [`ModelError::SeamTooLarge`] before anything is factorised.

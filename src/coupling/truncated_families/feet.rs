@@ -20,21 +20,21 @@ const SPREAD: f64 = 0.5;
 /// The least fraction of a bond that counts as the length of its part within the zone.
 const SHORTEST: f64 = 0.1;
 
-/// What the whole lattice, continued into the elements, says of the seam.
+/// Data of the seam from the whole lattice, continued into the elements.
 pub(in crate::coupling) struct Feet<const D: usize> {
     /// Number of points of the zone, which come first in the cloud.
     pub points: usize,
     /// For each point of the zone, the first weights ω of its bonds to feet, the last ones of its family.
     pub omega: Vec<Vec<f64>>,
-    /// What `Σ_p V_p b_pq` \[m^(D−1)\] is to be, for each point q of the zone: zero, or near surfaces of the body what it is in the whole lattice.
+    /// Target value of `Σ_p V_p b_pq` \[m^(D−1)\] for each point q of the zone: zero, or near surfaces of the body its value in the whole lattice.
     pub wanted: Vec<Vector<D>>,
-    /// Whether the whole family of each point is complete.
+    /// For each point, true if its whole family is complete.
     pub is_whole: Vec<bool>,
     /// The faces, seen from the elements.
     pub faces: Vec<BoundaryFacet>,
     /// Points of the lattice in the zone that are none, since they lie too close to a face.
     pub left_out: Vec<Vector<D>>,
-    /// What families have behind the faces.
+    /// Ends of the families at the feet, and the volumes behind the faces.
     pub ends: FamilyEnds,
 }
 

@@ -82,13 +82,13 @@ fn first_factors<const D: usize>(feet: &Feet<D>, body: &PdBody<D>, i: usize) -> 
 const DAMPED: usize = 3;
 const STRICT: usize = 20;
 
-/// How far the equations of a step are solved: the next one takes what is left.
+/// Relative tolerance on the equations of a step: the next one takes what is left.
 const ROUGH: f64 = 1e-3;
 
 /// Conditions of which so many steps leave more than this part cannot be met by positive weights.
 const STALLED: (usize, f64) = (4, 0.9);
 
-/// What is left of a weight in a step at least, and after all steps.
+/// Least factor of a weight in a step, and after all steps.
 const SMALLEST: f64 = 0.1;
 const LEAST: f64 = 0.01;
 
@@ -99,7 +99,7 @@ const SMALL_ROW: f64 = 0.5;
 const SLOW: usize = 20;
 const LONGEST: usize = 4000;
 
-/// What a condition may lack, over the damping.
+/// Tolerance on the residual of a condition, over the damping.
 const ENOUGH: f64 = 1e-13;
 
 /// Conditions on the changes of weights.
@@ -109,9 +109,9 @@ struct Fit {
     /// Points whose volume changes, in the columns behind those of the bonds.
     volumes: Vec<u32>,
     conditions: Columns,
-    /// What each condition lacks.
+    /// Residual of each condition.
     lacks: Vec<f64>,
-    /// Whether it has to be met.
+    /// For each condition, true if it has to be met.
     is_strict: Vec<bool>,
     damping: f64,
 }
@@ -334,7 +334,7 @@ impl RowNumbers {
         }
     }
 
-    /// What the sums are to be, and which of them must: far from surfaces all of them.
+    /// Sets the target values of the sums, and which of them must be met: far from surfaces all of them.
     fn demand<const D: usize>(
         &self,
         (mesh, of_node): (&Mesh<D>, &Transfer),

@@ -8,10 +8,10 @@ use crate::{coupling::sparse_factors::SparseFactors, parallel};
 #[derive(Default)]
 pub(super) struct Columns {
     pub rows: usize,
-    /// Where each column begins.
+    /// Start of each column.
     pub offsets: Vec<usize>,
     pub entries: Vec<(u32, f64)>,
-    /// Where each row begins.
+    /// Start of each row.
     of_rows: Vec<usize>,
     /// Columns and numbers of all rows.
     by_rows: Vec<(u32, f64)>,

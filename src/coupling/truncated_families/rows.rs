@@ -125,7 +125,7 @@ impl<const D: usize> MixedRows<D> for FamilyRows<'_, D> {
 }
 
 impl<const D: usize> Model<D> {
-    /// Whether a point of the cloud is a foot.
+    /// Returns true if a point of the cloud is a foot.
     pub(crate) fn is_foot(&self, point: u32) -> bool {
         self.feet.first().is_some_and(|first| point >= *first)
     }

@@ -2,7 +2,7 @@
 
 use super::PdBody;
 
-/// What families are that end at *feet*, places on the faces of elements, which are the last points of the cloud.
+/// Families that end at *feet*, places on the faces of elements, which are the last points of the cloud.
 ///
 /// Feet stand for what the body has behind a face: their volumes, times weights, are parts of sums, but no part of the body.
 #[derive(Clone, Debug)]
@@ -21,7 +21,7 @@ impl<const D: usize> PdBody<D> {
         self.ends = Some(ends);
     }
 
-    /// Whether a point of the cloud is a foot.
+    /// Returns true if point `i` of the cloud is a foot.
     pub(crate) fn is_foot(&self, i: usize) -> bool {
         self.ends.as_ref().is_some_and(|e| i >= e.feet as usize)
     }

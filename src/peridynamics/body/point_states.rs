@@ -1,4 +1,4 @@
-//! What the bonds of a point give at a displacement: its partial stress and its energy density.
+//! Partial stress and energy density of a point under a displacement, from its bonds.
 
 use super::PdBody;
 use crate::peridynamics::{CauchyStress, ForceState, MemorylessFamily};

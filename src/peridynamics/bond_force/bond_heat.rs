@@ -1,8 +1,8 @@
-//! What a temperature does to bonds: their free stretch, and the work of heating.
+//! Effect of temperature on bonds: their free stretch, and the work of heating.
 
 use super::BondKinematics;
 
-/// What temperature does to the bonds of a pass.
+/// Thermal expansion of the bonds of a pass.
 pub(super) struct Heat {
     /// Free stretch of each point.
     pub(super) free: Vec<f64>,
@@ -12,9 +12,9 @@ pub(super) struct Heat {
     pub(super) past: Vec<f64>,
     /// The same of the last force.
     pub(super) present: Vec<f64>,
-    /// Whether the next force is the first of all, from which sums begin.
+    /// True if the next force is the first of all, from which sums begin.
     pub(super) begins: bool,
-    /// Work that nobody has asked for yet \[J\].
+    /// Work that has not been taken yet \[J\].
     pub(super) work: f64,
 }
 

@@ -1,11 +1,11 @@
-//! Bonds as lists, with what their passes read.
+//! Bonds as lists, with the data that their passes read.
 
 use super::{
     BondKinematics,
     compressed_list::{Neighbours, Weights},
 };
 
-/// When bonds break, as a limit of `t`.
+/// Limit of `t` beyond which bonds break.
 pub(super) enum Limit {
     Never,
     Uniform(f64),
@@ -42,8 +42,8 @@ pub(super) struct List<const D: usize> {
     pub(super) reference: u64,
     /// Points and bonds that the last pass broke, ascending.
     pub(super) last: Vec<(u32, usize)>,
-    /// What is computed of each point, see `own_points.rs`; empty if all is.
+    /// Quantities computed of each point, see `own_points.rs`; empty if all are.
     pub(super) parts: Vec<u8>,
-    /// Whether the last force at own points broke bonds of points that are looked at.
+    /// True if the last force at own points broke bonds of points whose breaks are found here.
     pub(super) has_seen_breaks: bool,
 }

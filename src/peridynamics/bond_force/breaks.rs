@@ -1,4 +1,4 @@
-//! What the bonds that a pass broke have taken: energy stored before less that stored after, at a displacement of choice.
+//! Energy taken by the bonds that a pass broke: energy stored before less that stored after, at a displacement of choice.
 
 use super::lattice::Lattice;
 use super::list::{extension, stretched};

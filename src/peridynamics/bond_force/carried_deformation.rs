@@ -1,8 +1,8 @@
-//! What breaking bonds take from the deformation gradient of a point that has flowed plastically.
+//! Deformation that breaking bonds take from the deformation gradient of a point that has flowed plastically.
 //!
 //! `F̄` is a least-squares fit over intact bonds. When bonds break it jumps, since those that break are the longest; a point that remembers its plastic strain would take the jump for elastic strain, and be compressed by it.
-//! So the deformation that the broken bonds had is kept: the local law is asked at `F̄ C`, and each break turns C into `F̄₊⁻¹ F̄₋ C`, by which `F̄ C` and the stress do not jump (in small strains `G + C`, a sum).
-//! The stress that works on `F̄` is then `P Cᵀ`. A point that has not flowed knows nothing of what its broken bonds did: its stress is that of its intact ones.
+//! So the deformation that the broken bonds had is kept: the local law is evaluated at `F̄ C`, and each break turns C into `F̄₊⁻¹ F̄₋ C`, by which `F̄ C` and the stress do not jump (in small strains `G + C`, a sum).
+//! The stress that works on `F̄` is then `P Cᵀ`. A point that has not flowed keeps nothing of its broken bonds: its stress is that of its intact ones.
 
 use super::bond_failure::BondFailure;
 use crate::{
@@ -49,7 +49,7 @@ impl<const D: usize> CarriedDeformation<D> {
     }
 }
 
-/// The displacement gradient at which a local law is asked: `(I + G)(I + c) − I` of one for strains of any size, else `G + c`.
+/// The displacement gradient at which a local law is evaluated: `(I + G)(I + c) − I` of one for strains of any size, else `G + c`.
 pub(crate) fn felt<const D: usize>(
     gradient: &Tensor<D>,
     carried: Option<&Tensor<D>>,
@@ -62,7 +62,7 @@ pub(crate) fn felt<const D: usize>(
     }
 }
 
-/// What works on the gradient of the intact bonds, of the stress at [`felt`].
+/// Returns the stress that is work-conjugate to the gradient of the intact bonds, from the stress at [`felt`].
 pub(crate) fn conjugate<const D: usize>(
     stress: &Tensor<D>,
     carried: Option<&Tensor<D>>,

@@ -1,4 +1,4 @@
-//! What a list holds for each bond, in few bytes.
+//! Neighbours and weights of the bonds of a list, in few bytes.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! What resists zero-energy modes at a point that has a stress ([`ZeroEnergyControl`](crate::peridynamics::ZeroEnergyControl)), by the sums over its family.
+//! Control of zero-energy modes at a point that has a stress ([`ZeroEnergyControl`](crate::peridynamics::ZeroEnergyControl)), by the sums over its family.
 //!
 //! A drag is a force against velocities that are not uniform over a family. They are those of the interval, `(u − u₀)/Δt` from the displacement committed last; a force at once has those of the interval before.
 //! Of a rigid or uniform motion over a step this is a field that is linear in the deformed positions, so that it is not resisted, however far it goes.
@@ -18,11 +18,11 @@ pub(super) struct FamilyControl<const D: usize> {
     of_bond: Tensor<D>,
     /// C of a drag.
     of_difference: Option<Tensor<D>>,
-    /// What η, or with a drag Ẏ, is multiplied by.
+    /// Factor of η, or with a drag of Ẏ.
     factor: f64,
     /// `Σ T V`.
     pub(super) own: Vector<D>,
-    /// What a drag takes per volume \[W/m^D\].
+    /// Power taken by a drag per volume \[W/m^D\].
     pub(super) power: f64,
 }
 

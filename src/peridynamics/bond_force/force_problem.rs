@@ -1,4 +1,4 @@
-//! What a bond pass is made from.
+//! Input of a bond pass.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::{
 /// Largest difference of a number of a bond between its ends, in parts of it.
 pub(super) const ENDS: f64 = 1e-12;
 
-/// Which pass to build.
+/// Choice of the pass to build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
     /// The lattice pass where the points fill a lattice, else lists.
@@ -24,7 +24,7 @@ pub enum Layout {
     Lattice,
 }
 
-/// How the list pass stores the weights of its bonds.
+/// Storage of the bond weights of the list pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Storage {
     /// Eight bytes: nothing is lost.
@@ -70,11 +70,11 @@ pub enum BondCriterion<'a, const D: usize> {
     Uniform(f64),
     /// A number per bond; the same from both ends.
     PerBond(&'a BondFunction<'a, D>),
-    /// No stretch, but a state of points and bonds, which the generic pass alone knows.
+    /// No stretch, but a state of points and bonds, which the generic pass alone supports.
     State(&'a dyn StateCriterion),
 }
 
-/// When bonds fail.
+/// Failure criterion of bonds.
 #[derive(Clone, Copy)]
 pub struct Failure<'a, const D: usize> {
     /// Critical stretch \[1\]; infinite for bonds that only their law damages.
@@ -84,13 +84,13 @@ pub struct Failure<'a, const D: usize> {
 }
 
 impl<const D: usize> Failure<'_, D> {
-    /// Whether bonds break by their stretch: not at an infinite one, of bonds that their law damages.
+    /// Returns true if bonds break by a criterion: not at an infinite stretch, of bonds that their law damages.
     pub(super) fn has_limit(&self) -> bool {
         !matches!(self.critical, BondCriterion::Uniform(f64::INFINITY))
     }
 }
 
-/// Which families this process holds, and what all know of the others. Calls of passes that are made with it are collective.
+/// Families that this process holds, and sizes of the families of all points. Calls of passes that are made with it are collective.
 #[derive(Clone, Copy)]
 pub struct DistributedRows<'a> {
     /// The processes.
@@ -110,33 +110,33 @@ pub struct BondSetup<'a, const D: usize> {
     pub volume: &'a [f64],
     /// The reference families, one row per point, cut where voids and surfaces cut them; empty for points that only complete the families of others.
     pub families: &'a Families,
-    /// Which points want a force; the rest of the points with families only pass on their dilatation. Empty: all points with a family.
+    /// Points whose force is computed; the rest of the points with families only pass on their dilatation. Empty: all points with a family.
     pub rows: &'a [bool],
     /// Points of a state-based law without an energy of their own: of their force only what their neighbours' energies make is computed, the rest is someone else's. Empty: none.
     pub without_energy: &'a [bool],
     /// The law.
     pub force: BondForce<'a, D>,
-    /// How bonds follow the motion.
+    /// Kinematics of the bonds.
     pub kinematics: BondKinematics,
-    /// When bonds fail; `None` for never.
+    /// Failure of bonds; `None` for never.
     pub failure: Option<Failure<'a, D>>,
     /// Bonds `(i, j)` of the reference families that are broken from the start and count as damage: pre-cracks. Symmetric in its arguments.
     pub precracked: Option<&'a (dyn Fn(usize, usize) -> bool + Sync)>,
-    /// Which pass.
+    /// Choice of the pass.
     pub layout: Layout,
-    /// How lists store weights.
+    /// Storage of weights in lists.
     pub storage: Storage,
-    /// Who has which families, where they are spread over processes; none where all are here.
+    /// Distribution of the families over processes; none where all are here.
     pub shared: Option<DistributedRows<'a>>,
 }
 
-/// Why no pass can be built.
+/// Error in the construction of a bond pass.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum KernelError {
     /// Lists that belong together differ in length.
     #[error("bond pass: {what} has {length} entries for {points} points; give one per point")]
     Length {
-        /// Which list.
+        /// Name of the list.
         what: &'static str,
         /// Its length.
         length: usize,
@@ -195,13 +195,13 @@ pub enum KernelError {
     /// The lattice pass was asked for where there is none.
     #[error("bond pass: no lattice pass, {why}; choose the automatic layout")]
     NoLattice {
-        /// What stands against it.
+        /// Reason against it.
         why: String,
     },
 }
 
 impl<const D: usize> BondSetup<'_, D> {
-    /// Whether points remember a plastic strain.
+    /// Returns true if points have a plastic strain in their history.
     pub(super) fn flows(&self) -> bool {
         let BondForce::Law { law, .. } = self.force else {
             return false;
@@ -215,7 +215,7 @@ impl<const D: usize> BondSetup<'_, D> {
         self.position[j] - self.position[i]
     }
 
-    /// Whether point `i` wants a force.
+    /// Returns true if the force of point `i` is computed.
     pub(super) fn row(&self, i: usize) -> bool {
         self.has_family(i) && self.rows.get(i).copied().unwrap_or(true)
     }
@@ -243,13 +243,13 @@ impl<const D: usize> BondSetup<'_, D> {
         self.kinematics.limit(s)
     }
 
-    /// Whether bonds of point `i` never fail.
+    /// Returns true if bonds of point `i` never fail.
     pub(super) fn no_fail(&self, i: usize) -> bool {
         self.failure
             .is_some_and(|f| f.no_fail.get(i).copied().unwrap_or(false))
     }
 
-    /// Whether point `i` has no energy of its own.
+    /// Returns true if point `i` has no energy of its own.
     pub(super) fn has_no_energy(&self, i: usize) -> bool {
         self.without_energy.get(i).copied().unwrap_or(false)
     }
@@ -268,7 +268,7 @@ impl<const D: usize> BondSetup<'_, D> {
             .sum()
     }
 
-    /// Whether lists belong together and families have weight.
+    /// Checks that lists belong together and families have weight.
     pub(super) fn check_lists(&self) -> Result<(), KernelError> {
         let points = self.position.len();
         let no_fail = self.failure.map_or(&[][..], |f| f.no_fail);
@@ -312,7 +312,7 @@ impl<const D: usize> BondSetup<'_, D> {
         self.first_fault(without_weight)
     }
 
-    /// Whether every bond has its reverse, and weighs the same from both ends.
+    /// Checks that every bond between two families has its reverse, with the same weight and critical stretch.
     pub(super) fn check_bonds(&self) -> Result<(), KernelError> {
         self.first_fault(|i| self.fault(i))
     }

@@ -28,14 +28,14 @@ use crate::{
 /// No bond from the other end.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// What points and bonds remember; bonds in the order of the families.
+/// History variables of points and bonds; bonds in the order of the families.
 #[derive(Clone, Default)]
 pub(super) struct History {
     pub(super) point: Vec<f64>,
     pub(super) bonds: Vec<f64>,
 }
 
-/// What a point did in a step.
+/// Dissipation and plastic flow of a point in a step.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Outcome {
     /// Energy dissipated \[J\].
@@ -63,14 +63,14 @@ pub(super) struct Generic<const D: usize> {
     pub(super) carried: Option<CarriedDeformation<D>>,
     pub(super) kinematics: BondKinematics,
     pub(super) intact: Vec<bool>,
-    /// Bonds that were told to be broken because their damage is 1 at both ends; they stay in their families. Empty for a law without damage.
+    /// Bonds that were reported as broken because their damage is 1 at both ends; they stay in their families. Empty for a law without damage.
     pub(super) damaged_through: Vec<bool>,
     /// Volume of the far points of each family, with what lies behind faces at which it ends; empty where no bond can be broken.
     pub(super) family_volume: Vec<f64>,
     /// Committed, and at the end of the last force.
     pub(super) past: History,
     pub(super) present: History,
-    /// What each point did in the last force.
+    /// Outcome of each point in the last force.
     pub(super) outcome: Vec<Outcome>,
     /// Points and bonds, counted over all families, that the last force broke.
     pub(super) last: Vec<(u32, usize)>,
@@ -78,7 +78,7 @@ pub(super) struct Generic<const D: usize> {
     pub(super) force_state: Vec<Vector<D>>,
     /// Of a law whose points have a stress.
     pub(super) points: Option<PointForces<D>>,
-    /// What temperature does; none where nothing expands.
+    /// Thermal expansion of bonds; none where nothing expands.
     pub(super) heat: Option<Heat>,
 }
 
@@ -107,7 +107,7 @@ pub(super) struct Scratch<const D: usize> {
     pub(super) carried: Option<Tensor<D>>,
 }
 
-/// What a law reads of a family, and what it overwrites.
+/// Input of a law for one family, and the numbers that it overwrites.
 pub(super) struct Parts<'a, const D: usize> {
     pub(super) family: DeformedFamily<'a, D>,
     pub(super) past: &'a [f64],

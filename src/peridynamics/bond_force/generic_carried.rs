@@ -1,4 +1,4 @@
-//! Which deformation the points of the generic pass carry where their bonds break ([`super::carried_deformation`]).
+//! Deformation that the points of the generic pass carry where their bonds break ([`super::carried_deformation`]).
 
 use super::generic::{Generic, at};
 use crate::{
@@ -35,7 +35,7 @@ impl<const D: usize> Generic<D> {
         Some(sum * spanned_inverse(whole, Some(&left))?)
     }
 
-    /// Whether the local law of a point holds for strains of any size.
+    /// Returns true if the local law of a point holds for strains of any size.
     pub(super) fn is_finite_strain(&self, i: usize) -> bool {
         let material = self.material.get(i).copied().unwrap_or(0);
         let states = self.law.force_state();

@@ -17,7 +17,7 @@ impl<const D: usize> Generic<D> {
         }
     }
 
-    /// Whether a bond has neither broken nor been damaged through.
+    /// Returns true if a bond has neither broken nor been damaged through.
     pub(super) fn stands(&self, bond: usize) -> bool {
         self.intact[bond] && !self.damaged_through.get(bond).is_some_and(|gone| *gone)
     }

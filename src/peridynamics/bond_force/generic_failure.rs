@@ -22,7 +22,7 @@ use crate::{
 const FLATTEST: f64 = 0.25;
 
 impl<const D: usize> Generic<D> {
-    /// Whether what is left of a torn family is so flat at these displacements that its stiffness, which grows with `F̄⁻¹`, has left the stable step behind, or is turned inside out.
+    /// Returns true if the intact part of a torn family is so flat at these displacements that its stiffness, which grows with `F̄⁻¹`, exceeds that of the stable step, or if it is turned inside out.
     fn is_flattened(&self, i: usize, u: &[f64]) -> bool {
         let intact = self.points.as_ref().map(|points| &points.intact[i]);
         let is_torn = intact.is_some_and(|intact| intact.damage > 0.0 && intact.inverse.is_some());
@@ -140,7 +140,7 @@ impl<const D: usize> Generic<D> {
         lost
     }
 
-    /// Bonds that stand, history of the law and of the criterion, and what drags and points remember.
+    /// Intact bonds, history of the law and of the criterion, and history of drags and points.
     pub(super) fn words(&self) -> Vec<u64> {
         let mut words = Vec::new();
         if !matches!(self.failure, BondFailure::Never) {

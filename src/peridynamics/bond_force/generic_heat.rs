@@ -18,7 +18,7 @@ impl<const D: usize> Generic<D> {
             .filter(|_| self.stretch_place().is_none())
     }
 
-    /// Which of the numbers of a point is the free stretch of its local law.
+    /// Place of the free stretch of the local law among the numbers of a point.
     fn stretch_place(&self) -> Option<usize> {
         let law = self.law.force_state()?.correspondence(None)?.law;
         law.history().free_stretch

@@ -1,4 +1,4 @@
-//! What the generic pass tells of the force states of single points.
+//! Force states of single points in the generic pass: stress, energy density and history.
 
 use super::{
     BondPass, ForceStates,

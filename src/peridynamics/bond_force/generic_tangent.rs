@@ -52,7 +52,7 @@ impl<const D: usize> Generic<D> {
         self.gather(&states, y);
     }
 
-    /// What a length control has at rest beyond the bond force that stands for it in the linearisation: along ξ alone instead of the mean over directions.
+    /// Returns the force of a length control at rest beyond the bond force that stands for it in the linearisation: along ξ alone instead of the mean over directions.
     fn beyond_linear(
         &self,
         state: &StatePart<D>,

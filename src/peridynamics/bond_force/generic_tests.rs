@@ -1,4 +1,4 @@
-//! What holds of every law: nothing here names one, but where an accelerator is compared.
+//! Tests of properties that hold for every law: none is named here, except where an accelerator is compared.
 
 use std::sync::Arc;
 
@@ -460,7 +460,7 @@ fn rotations_turn_the_forces_and_histories_go_on_from_a_checkpoint() {
     }
 }
 
-/// What a pass tells of its damage.
+/// Results of a damaging step.
 struct Told {
     damage: Vec<f64>,
     force: Vec<f64>,

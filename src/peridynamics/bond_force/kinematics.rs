@@ -1,6 +1,6 @@
-//! How bonds follow a motion: exactly, or to first order.
+//! Kinematics of bonds under a motion: exact, or to first order.
 
-/// How bonds follow the motion.
+/// Kinematics of bonds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BondKinematics {
     /// Bonds rotate and stretch: any displacement.

@@ -28,7 +28,7 @@ pub(super) struct Solid {
     pub(super) group_of: Vec<u32>,
 }
 
-/// What a process has of a lattice whose points are moved by several, each its own.
+/// Share of a process in a lattice whose points are moved by several, each its own.
 pub(super) struct OwnReach {
     /// Own points, in chunks of [`COPY`].
     pub(super) own: Segments,
@@ -50,7 +50,7 @@ pub(super) struct Lattice<const D: usize> {
     /// Points whose bonds never fail, by cell; empty for none.
     pub(super) no_fail: Vec<bool>,
     pub(super) flags: Vec<u8>,
-    /// Volume of each point that wants a force, 0 for the others; empty if all do and are alike.
+    /// Volume of each point whose force is computed, 0 for the others; empty if all are computed and alike.
     pub(super) scale: Vec<f64>,
     /// Group times eight plus lane of each point, [`NONE`] for those without a family.
     pub(super) place: Vec<u32>,
@@ -60,13 +60,13 @@ pub(super) struct Lattice<const D: usize> {
     pub(super) u: [Vec<f64>; D],
     pub(super) sums: Vec<[f64; LANES]>,
     pub(super) reference: u64,
-    /// What the last pass broke.
+    /// Bonds that the last pass broke.
     pub(super) broken: Vec<Broken>,
     /// Lanes of each group that are not left to others; empty if all are.
     pub(super) own: Vec<u8>,
-    /// What is known of others where each process moves its own points.
+    /// Points that are own or known where each process moves its own points.
     pub(super) reach: Option<OwnReach>,
-    /// Whether the last force at own points broke bonds of points that are looked at.
+    /// True if the last force at own points broke bonds of points whose breaks are found here.
     pub(super) has_seen_breaks: bool,
 }
 

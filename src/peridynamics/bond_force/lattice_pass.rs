@@ -131,7 +131,7 @@ impl<const D: usize> Lattice<D> {
         )
     }
 
-    /// What the dilatations of a sweep make of `pull`, but for groups that are idle.
+    /// Computes `pull` from the dilatations of a sweep, except for groups that are idle.
     pub(super) fn pull_from(
         &self,
         solid: &Solid,

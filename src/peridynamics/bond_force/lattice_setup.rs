@@ -16,7 +16,7 @@ fn most_common(volume: &[f64]) -> f64 {
     runs.max_by_key(|r| r.len()).map_or(1.0, |r| r[0])
 }
 
-/// What the cells of the padded box hold; see the fields of the same names in [`Lattice`].
+/// Contents of the cells of the padded box; see the fields of the same names in [`Lattice`].
 struct Filled {
     unit: f64,
     volume: Vec<f64>,
@@ -26,7 +26,7 @@ struct Filled {
     without_energy: Vec<bool>,
 }
 
-/// What a solid adds to a lattice: factors of dilatation and of the deviatoric part from the weighted volumes of families.
+/// Computes the numbers that a solid adds to a lattice: factors of dilatation and of the deviatoric part from the weighted volumes of families.
 fn solid<const D: usize>(
     stencil: &Stencil<D>,
     volume: &[f64],
@@ -67,7 +67,7 @@ fn solid<const D: usize>(
 }
 
 impl<const D: usize> Lattice<D> {
-    /// The pass of a cloud, or why it has none.
+    /// The pass of a cloud, or the reason that it has none.
     pub(super) fn new(setup: &BondSetup<'_, D>) -> Result<Self, String> {
         let unit = most_common(setup.volume);
         if unit.is_nan() || unit <= 0.0 {

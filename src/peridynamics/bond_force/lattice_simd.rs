@@ -9,7 +9,7 @@ use super::{
     stretch::{CHI, PSI, SERIES_RANGE, SHORTEST},
 };
 
-/// What a sweep sums.
+/// Sums that a sweep computes.
 pub(super) mod job {
     /// Forces of pairwise bonds.
     pub const PAIR: u8 = 0;
@@ -34,7 +34,7 @@ pub(super) const EARLY: u8 = 32;
 /// Nobody does.
 pub(super) const LATE: u8 = 64;
 
-/// What all tasks of a sweep read.
+/// Input of all tasks of a sweep.
 #[derive(Clone, Copy)]
 pub(super) struct Field<'a, const D: usize> {
     pub offsets: &'a [Offset<D>],

@@ -18,7 +18,7 @@ use crate::{
 /// Points per task; a constant, so that no result depends on the number of threads.
 const BLOCK: usize = 256;
 
-/// What one bond gives.
+/// Stretch and direction of one bond.
 pub(crate) struct Stretched<const D: usize> {
     /// `t r²` and `r²`: a bond beyond its limit is found without dividing.
     pub(crate) excess: f64,

@@ -8,7 +8,7 @@ use super::simd::{LANES, Lanes, Work, dispatch};
 use super::stretch::{CHI, PSI};
 use crate::peridynamics::bond_force::bond_list::{Limit, List};
 
-/// What the bonds of a point add up to.
+/// Quantity summed over the bonds of a point.
 #[derive(Clone, Copy)]
 pub(super) enum Sum<'a> {
     /// Forces of a pairwise law.

@@ -2,24 +2,24 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `force_problem.rs` | what a pass is made from, and the errors |
-//! | `kinematics.rs` | how bonds follow a motion: exactly, or to first order |
+//! | `force_problem.rs` | input of a pass, and the errors |
+//! | `kinematics.rs` | kinematics of bonds: exact, or to first order |
 //! | `stretch.rs` | one bond: stretch, force and extension without cancellation |
 //! | `breaks.rs` | energy of the bonds that a pass broke |
 //! | `generic.rs`, `generic_tangent.rs` | the pass that any law takes, by its force states; its tangent at rest |
-//! | `point_forces.rs`, `point_state.rs`, `family_control.rs` | the same of correspondence, by a stress per point; what it keeps; its zero-energy control |
+//! | `point_forces.rs`, `point_state.rs`, `family_control.rs` | the same of correspondence, by a stress per point; its data; its zero-energy control |
 //! | `point_loops.rs` | its loops over the bonds |
-//! | `bond_failure.rs`, `generic_failure.rs` | what breaks its bonds, and how |
+//! | `bond_failure.rs`, `generic_failure.rs` | failure of its bonds |
 //! | `carried_deformation.rs`, `generic_carried.rs` | the deformation that a point which has flowed keeps where its bonds break |
 //! | `bond_heat.rs`, `generic_heat.rs` | temperature: the stretch that counts, the work of heating |
-//! | `generic_states.rs` | what it tells of single points |
+//! | `generic_states.rs` | its force states at single points |
 //! | `generic_damage.rs` | damage that laws keep of their bonds |
-//! | `bond_list.rs` | neighbour lists with what their pass reads |
+//! | `bond_list.rs` | neighbour lists with the data of their pass |
 //! | `list.rs`, `list_simd.rs` | the pass over neighbour lists, for any cloud; eight bonds of it at a time |
 //! | `compressed_list.rs` | neighbours and weights of a list in few bytes |
 //! | `lattice.rs` | the pass over a regular lattice: a fixed stencil and no list |
 //! | `lattice_pass.rs` | its sweeps, and forces by point |
-//! | `lattice_setup.rs` | how that one is made |
+//! | `lattice_setup.rs` | its setup |
 //! | `own_points.rs` | points shared out among several passes |
 //! | `shared_rows.rs` | families that are spread over processes |
 //! | `stencil.rs`, `stencil_numbers.rs` | the lattice's padded box, its offsets and bits; their weights |
@@ -29,7 +29,7 @@
 //!
 //! A bond is seen through `t = (2 ξ·η + η·η)/r²`, so that `|ξ + η| = r √(1 + t)`: no length is ever the difference of two long ones, and the stretch
 //! `s = √(1 + t) − 1` exceeds `s_c` exactly where `t > s_c (2 + s_c)`, without a root. Both ends of a bond compute the same `t` from the same numbers,
-//! hence break together without telling each other. Every method gives the same bits for any number of threads.
+//! hence break together without communication. Every method gives the same bits for any number of threads.
 
 mod bond_failure;
 mod bond_heat;
@@ -100,7 +100,7 @@ pub trait BondPass<const D: usize>: Send + Sync {
     /// Number of points of the cloud.
     fn points(&self) -> usize;
 
-    /// Which pass this is, in a word: `list` or `lattice`.
+    /// Name of this pass, in a word: `list` or `lattice`.
     fn name(&self) -> &'static str;
 
     /// Directed bonds of the reference families.
@@ -119,7 +119,7 @@ pub trait BondPass<const D: usize>: Send + Sync {
     /// Ends the interval of the last call of [`BondPass::force_into`]: its history is the past of the next. Returns the energy that points with rows dissipated in it \[J\].
     fn commit(&mut self) -> f64;
 
-    /// Whether there is a history.
+    /// Returns true if the pass has history variables.
     fn remembers(&self) -> bool;
 
     /// `y = K x` with the tangent `K` at rest and bonds as they stand; zero for points without a row.
@@ -134,7 +134,7 @@ pub trait BondPass<const D: usize>: Send + Sync {
     /// Overwrites `damage` with `1 − Σ (1 − φ) V / Σ V` of every point, φ = 1 of broken bonds and else what a law says, 0 if nothing; zero where there is no family.
     fn damage_into(&self, damage: &mut [f64]);
 
-    /// Whether a bond of point `i` is broken, or damaged by its law.
+    /// Returns true if a bond of point `i` is broken, or damaged by its law.
     fn is_damaged(&self, i: usize) -> bool;
 
     /// Directed bonds of the reference families that are broken, or damaged through by their law at both ends.
@@ -152,14 +152,14 @@ pub trait BondPass<const D: usize>: Send + Sync {
     /// their energy before less that after, all of these bonds removed at once \[J\]. Of a state-based law that is the change of dilatations too.
     fn add_lost_energy(&self, at: &dyn Fn(usize) -> [f64; D], lost: &mut ExactSum);
 
-    /// What [`BondPass::add_lost_energy`] adds up to \[J\].
+    /// Returns the energy that [`BondPass::add_lost_energy`] adds up \[J\].
     fn lost_energy(&self, at: &dyn Fn(usize) -> [f64; D]) -> f64 {
         let mut lost = ExactSum::default();
         self.add_lost_energy(at, &mut lost);
         lost.value()
     }
 
-    /// Whether a bond of the reference families joins points `i` and `j`, both with a family, and stands; contact leaves such pairs to their bond.
+    /// Returns true if a bond of the reference families joins points `i` and `j`, both with a family, and is intact; contact leaves such pairs to their bond.
     fn bonded(&self, i: usize, j: usize) -> bool;
 
     /// The bits that say which bonds stand.
@@ -176,7 +176,7 @@ pub trait BondPass<const D: usize>: Send + Sync {
         None
     }
 
-    /// The force states that it computes one by one, for what is told of them; none of an accelerator.
+    /// The force states that it computes one by one, for queries of them; none of an accelerator.
     fn force_states(&self) -> Option<&dyn ForceStates<D>>;
 
     /// Bytes that the pass holds.
@@ -188,7 +188,7 @@ pub trait HeatedBonds {
     /// Sets the stretch `α ΔT` by which each point expands freely; a bond has the mean of its ends. Forces, energies and criteria are those of what is left of its stretch. `solid` is the stretch of the solid that each point is made of, which its local law takes: in plane strain it is smaller.
     fn set_free_stretch(&mut self, free: &[f64], solid: &[f64]);
 
-    /// The work that changes of the free stretch have done since it was last asked for \[J\], up to the last [`BondPass::commit`].
+    /// The work that changes of the free stretch have done since it was last taken \[J\], up to the last [`BondPass::commit`].
     fn take_heat_work(&mut self) -> f64;
 }
 
@@ -215,19 +215,19 @@ pub trait OwnPoints {
         told: Told<'_>,
     ) -> u64;
 
-    /// Whether the last such force broke bonds of points that are looked at, own ones or not.
+    /// Returns true if the last such force broke bonds of points whose breaks are found here, own points or not.
     fn has_seen_breaks(&self) -> bool;
 }
 
-/// What is done once the forces are there that others wait for.
+/// Callback that runs once the forces are there that others wait for.
 pub type Told<'a> = &'a mut dyn FnMut(&[f64]);
 
 /// Points of a process among those of a body.
 #[derive(Clone, Copy, Debug)]
 pub struct Reach<'a> {
-    /// Whether each point is its own.
+    /// True for each point that is its own.
     pub own: &'a [bool],
-    /// Whether the displacement of each is known.
+    /// True for each point whose displacement is known.
     pub known: &'a [bool],
     /// Own points whose forces others wait for.
     pub sent: &'a [u32],
@@ -235,7 +235,7 @@ pub struct Reach<'a> {
     pub followed: &'a [u32],
 }
 
-/// What force states tell of a body.
+/// Results from the force states of a body.
 pub trait ForceStates<const D: usize> {
     /// The stress of a point by its intact bonds and its history, [`crate::peridynamics::ForceState::stress`], where the points are displaced by `displaced` \[m\].
     fn stress(&self, point: usize, displaced: &dyn Fn(usize) -> Vector<D>) -> CauchyStress<D>;
@@ -249,7 +249,7 @@ pub trait ForceStates<const D: usize> {
     /// Number of points with rows that have lost bonds and do not respond at the displacements `u`, [`crate::peridynamics::ForceState::responds`].
     fn points_without_response(&self, u: &[f64]) -> usize;
 
-    /// What points remember, by name: one number per point.
+    /// History variables of points, by name: one number per point.
     fn remembered(&self) -> Vec<(&'static str, Vec<f64>)>;
 }
 

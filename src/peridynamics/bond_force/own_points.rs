@@ -1,4 +1,4 @@
-//! Passes whose points are shared out among several: each computes the forces of its own points, and tells the others which bonds it broke.
+//! Passes whose points are shared out among several: each computes the forces of its own points, and reports to the others which bonds it broke.
 //!
 //! The sums of a point are the same whoever computes them. A state-based law takes the dilatations of the neighbours of own points too, and bonds of these break
 //! here as they do where they are owned, since both ends and all who look at a bond see the same numbers.
@@ -11,7 +11,7 @@ use super::stencil::NONE;
 use super::{BondPass, OwnPoints, Reach, Told};
 use crate::system::{FailureUpdate, Interval, Segments};
 
-/// What a list pass computes of a point.
+/// Quantities that a list pass computes of a point.
 pub(super) mod part {
     /// Its dilatation, and which of its bonds break.
     pub const SEEN: u8 = 1;
@@ -39,7 +39,7 @@ impl<const D: usize> Lattice<D> {
         seen
     }
 
-    /// Where processes move their own points: mends what displacements that are not known broke, and lists breaks of own points only.
+    /// Restores the bonds that unknown displacements broke, and lists breaks of own points only, where processes move their own points.
     pub(super) fn forget_breaks_of_others(&mut self) {
         let Some(reach) = &self.reach else {
             return;

@@ -1,9 +1,9 @@
 //! The force of laws whose points have a stress: correspondence without a force state per bond.
 //!
-//! `T_i⟨ξ⟩ = ω (B_i ξ + q_i η)` with one tensor `B` and one number `q` per point, so that two loops over the bonds are enough: one adds up the deformation gradient of each family, after which the local law
-//! is asked once per point; the other adds up what the points around give (`point_loops.rs`). The own part of a force, `B_i Σ ω ξ V + q_i Σ ω η V`, needs no second loop. A drag is part of the same loops
+//! `T_i⟨ξ⟩ = ω (B_i ξ + q_i η)` with one tensor `B` and one number `q` per point, so that two loops over the bonds are enough: one computes the deformation gradient of each family, after which the local law
+//! is evaluated once per point; the other adds up the contributions of the neighbours (`point_loops.rs`). The own part of a force, `B_i Σ ω ξ V + q_i Σ ω η V`, needs no second loop. A drag is part of the same loops
 //! (`family_control.rs`).
-//! What this computes is what [`crate::peridynamics::ForceState::respond`] says of such laws, bond by bond (`point_forces_tests.rs`).
+//! The result is that of [`crate::peridynamics::ForceState::respond`] for such laws, bond by bond (`point_forces_tests.rs`).
 
 use rayon::prelude::*;
 
@@ -110,7 +110,7 @@ impl<const D: usize> Generic<D> {
         }
     }
 
-    /// The local response of a point whose intact bonds have the displacement gradient `gradient`, the gradient at which the law was asked, and whether it is one for strains of any size; none if its family has no response.
+    /// The local response of a point whose intact bonds have the displacement gradient `gradient`, the gradient at which the law was evaluated, and whether it is one for strains of any size; none if its family has no response.
     fn local_response(
         &self,
         i: usize,
@@ -327,7 +327,7 @@ impl<const D: usize> Generic<D> {
         ((1.0 - damage) * found.stored + 0.5 * fade * squares) * self.volume[i]
     }
 
-    /// What is left of the control of a point over a step, and after it ([`control_left`]).
+    /// Returns the remaining share of the control of a point over a step, and after it ([`control_left`]).
     fn fades(&self, past: &[f64], present: &[f64]) -> (f64, f64) {
         match self.layout.damage {
             Some(KeptDamage::Point(place)) => {

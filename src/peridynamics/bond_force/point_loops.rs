@@ -73,7 +73,7 @@ pub(super) struct Bonds<'a> {
     pub(super) weights: &'a [f64],
 }
 
-/// What the bonds of a family add up to.
+/// Sums over the bonds of a family.
 pub(super) struct Moments<const D: usize> {
     /// `Σ w η ⊗ ξ` \[m^(D+2)\].
     pub(super) displacement: Tensor<D>,
@@ -82,7 +82,7 @@ pub(super) struct Moments<const D: usize> {
     pub(super) rates: RateMoments<D>,
 }
 
-/// What their velocities add up to; zero where there is no drag.
+/// Sums with the velocities of the bonds; zero where there is no drag.
 pub(super) struct RateMoments<const D: usize> {
     /// `Σ w Ẏ ⊗ Y`.
     pub(super) rate: Tensor<D>,
@@ -207,7 +207,7 @@ impl<const W: usize, const RATE: bool> Work for Add<'_, W, RATE> {
     }
 }
 
-/// What every bond takes from its far point: `B ξ + q η`, or with a drag `(B − s L) ξ − s L η + s Ẏ`, as padded columns.
+/// Coefficients that every bond takes from its far point, of `B ξ + q η`, or with a drag of `(B − s L) ξ − s L η + s Ẏ`, as padded columns.
 pub(super) struct Given {
     columns: Vec<f64>,
     has_velocity: bool,
@@ -264,7 +264,7 @@ pub(super) fn give<const D: usize>(
     last.fill(factor);
 }
 
-/// What the far points give to the bonds of a point: `Σ w T`.
+/// Returns the sum of the forces that the far points give to the bonds of a point: `Σ w T`.
 pub(super) fn taken<const D: usize>(bonds: Bonds<'_>, sites: &Sites, given: &Given) -> [f64; D] {
     match const { width(D) } {
         1 => taken_by_width::<D, 1>(bonds, sites, given),

@@ -1,4 +1,4 @@
-//! What the pass over points that have a stress keeps, and what a drag remembers.
+//! Data of the pass over points that have a stress, and the history of a drag.
 
 use super::point_loops::{Given, Sites};
 use crate::{
@@ -11,7 +11,7 @@ use crate::{
 /// Numbers of a task that makes velocities.
 const NUMBERS: usize = 4096;
 
-/// What a family has whatever its deformation, by its intact bonds.
+/// Properties of a family that its deformation does not change, from its intact bonds.
 #[derive(Clone, Copy)]
 pub(super) struct Intact<const D: usize> {
     /// `K⁻¹`; none if they do not span the space.
@@ -22,7 +22,7 @@ pub(super) struct Intact<const D: usize> {
     pub(super) damage: f64,
 }
 
-/// What the pass keeps for it.
+/// Data of the pass over points that have a stress.
 pub(super) struct PointForces<const D: usize> {
     pub(super) control: ZeroEnergyControl,
     /// ω V of every bond, V of its far point; 0 of broken ones.
@@ -81,7 +81,7 @@ impl<const D: usize> PointForces<D> {
     }
 }
 
-/// What a drag remembers, and what it finds.
+/// History of a drag, and its present values.
 pub(super) struct Drag {
     /// Displacement and velocity that were committed last.
     before: Vec<f64>,
@@ -125,7 +125,7 @@ impl Drag {
         self.velocity.clone_from(&self.present_velocity);
     }
 
-    /// What it keeps in checkpoints.
+    /// Returns the numbers kept in checkpoints.
     pub(super) fn kept(&self) -> impl Iterator<Item = &f64> {
         self.before.iter().chain(&self.velocity)
     }

@@ -125,7 +125,7 @@ pub(super) fn with<const D: usize, T>(
     run(bond_pass(&setup).unwrap())
 }
 
-/// Textbook formulas in a double loop; `intact(i, j)` says which bonds of the families count.
+/// Textbook formulas in a double loop; `intact(i, j)` is true for the bonds of the families that count.
 pub(super) fn naive<const D: usize>(
     case: &Case<D>,
     law: Law,

@@ -1,4 +1,4 @@
-//! Families that are spread over processes: what a pass has to know of all of them, and the families of all where a pass needs these.
+//! Families that are spread over processes: the data of all of them that a pass needs, and the families of all where a pass needs these.
 //!
 //! A lattice asks for numbers of its offsets and for the bits of all bonds, a quarter of a byte for each. Lists hold the bonds of all points.
 
@@ -21,12 +21,12 @@ impl<const D: usize> BondSetup<'_, D> {
         }
     }
 
-    /// Whether a point has a family, whoever holds it.
+    /// Returns true if a point has a family, whoever holds it.
     pub(super) fn has_family(&self, i: usize) -> bool {
         self.family_size(i) > 0
     }
 
-    /// Whether something holds on all processes; as it is here where there are no others.
+    /// Returns true if a condition holds on all processes; `here` where there are no others.
     pub(super) fn holds_on_all(&self, here: bool) -> bool {
         self.shared
             .map_or(here, |shared| all_say(shared.ranks, here))
@@ -48,7 +48,7 @@ impl<const D: usize> BondSetup<'_, D> {
 }
 
 impl DistributedRows<'_> {
-    /// What all processes know of the bonds of each offset; none where one of them has found no lattice. Of several bonds that of the first point counts, as in one process.
+    /// Merges the numbers of all processes for the bonds of each offset; none where one of them has found no lattice. Of several bonds that of the first point counts, as in one process.
     pub(super) fn merged<const D: usize>(
         &self,
         found: Option<&OffsetTable<Known, D>>,
@@ -82,7 +82,7 @@ impl DistributedRows<'_> {
         word: impl Fn(usize, usize) -> u64,
         mut put: impl FnMut(usize, u64),
     ) {
-        /// Points of which bonds are told at a time.
+        /// Points whose bonds are exchanged at a time.
         const AT_A_TIME: usize = 1 << 14;
         let points = self.own.len();
         for first in (0..points).step_by(AT_A_TIME) {
@@ -108,7 +108,7 @@ impl DistributedRows<'_> {
 
     /// Collective: sets in `bits`, `width` bytes for each group, what other processes have set in groups of which they have points.
     pub(super) fn merge_bits(&self, width: usize, is_own: impl Fn(usize) -> bool, bits: &mut [u8]) {
-        /// Bytes of bits that are told at a time.
+        /// Bytes of bits that are exchanged at a time.
         const AT_A_TIME: usize = 1 << 23;
         let step = (AT_A_TIME / width.max(1)).max(1) * width.max(1);
         for (part, bits) in bits.chunks_mut(step).enumerate() {
@@ -136,7 +136,7 @@ impl DistributedRows<'_> {
 /// The families of all points with the numbers of their bonds, on every process.
 struct Whole {
     families: Families,
-    /// What the law gives to a bond.
+    /// Coefficient of each bond by the law.
     coefficient: Vec<f64>,
     /// The stretch at which a bond breaks; empty where it is one for all or none.
     stretch: Vec<f64>,

@@ -31,7 +31,7 @@ pub(super) trait Lanes: Copy {
     fn keep(self, a: Self::V, mask: u8) -> Self::V;
     /// `a` where the mask has a bit, `b` elsewhere.
     fn select(self, mask: u8, a: Self::V, b: Self::V) -> Self::V;
-    /// Where `a > b`.
+    /// Mask of the lanes with `a > b`.
     fn above(self, a: Self::V, b: Self::V) -> u8;
 }
 

@@ -216,7 +216,7 @@ fn points_of_cells<const D: usize>(cells: &Box3, site: &[[i32; D]]) -> Result<Ve
     Ok(point_of)
 }
 
-/// Where the points of the lanes of each group are.
+/// Sites of the points in the lanes of each group.
 struct LaneSites<'a, const D: usize> {
     groups: &'a [u32],
     point_of: &'a [u32],
@@ -385,7 +385,7 @@ impl<const D: usize> Stencil<D> {
         }
     }
 
-    /// Whether a bond lacks its reverse, where the point at its other end has a family; `mirror` is the offset opposite to each.
+    /// Returns true if a bond lacks its reverse, where the point at its other end has a family; `mirror` is the offset opposite to each.
     fn has_one_sided(
         &self,
         mirror: &[Option<usize>],
@@ -435,9 +435,9 @@ pub struct BlockSetup<'a, const D: usize> {
     pub spacing: [f64; D],
     /// Horizon \[m\].
     pub horizon: f64,
-    /// The law; its function is asked for point 0 and bond 0 only.
+    /// The law; its function is evaluated for point 0 and bond 0 only.
     pub force: super::BondForce<'a, D>,
-    /// How bonds follow the motion.
+    /// Kinematics of the bonds.
     pub kinematics: super::BondKinematics,
     /// Critical stretch \[1\]; `None` for never.
     pub critical: Option<f64>,

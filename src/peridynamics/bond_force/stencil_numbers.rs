@@ -19,7 +19,7 @@ const ALIKE: f64 = 0.2 * ENDS;
 /// Part of the largest weight below which a weight is measured by that: what rounding leaves of an influence function that vanishes at the horizon is no difference.
 const SMALL: f64 = 1e-3;
 
-/// Whether weights and limits of two bonds differ by more than a part of them; `largest` is the largest weight around.
+/// Returns true if weights or limits of two bonds differ by more than a part of them; `largest` is the largest weight around.
 fn differs((w, l): (f64, f64), (weight, limit): (f64, f64), part: f64, largest: f64) -> bool {
     (w - weight).abs() > part * w.abs().max(SMALL * largest)
         || (l != limit && (l - limit).abs() > part * l.abs())
@@ -34,7 +34,7 @@ fn largest<const D: usize>(found: &OffsetTable<Known, D>) -> f64 {
 /// Weights and limits of the bonds of a lattice.
 pub(super) struct Numbers<const D: usize> {
     pub by_steps: OffsetTable<(f64, f64), D>,
-    /// Whether all of them differ so little that no bond differs between its ends.
+    /// True if all of them differ so little that no bond differs between its ends.
     pub are_alike: bool,
 }
 

@@ -184,10 +184,10 @@ fn a_large_rotation_turns_the_forces() {
     }
 }
 
-/// Which bonds stand, by the numbers of their points.
+/// Test for an intact bond, by the numbers of its points.
 type Standing<'a> = &'a dyn Fn(usize, usize) -> bool;
 
-/// What broke took what was stored before less what is stored after, wherever points are.
+/// Checks that the broken bonds took the energy stored before less that stored after, at any displacement.
 fn check_lost_energy<const D: usize>(
     case: &Case<D>,
     law: Law,

@@ -102,7 +102,7 @@ pub(crate) fn tension(principal: &[f64; 3]) -> f64 {
     }
 }
 
-/// What a point adds to the averages of a family.
+/// Contribution of a point to the averages of a family.
 #[derive(Clone, Copy, Default)]
 struct Share {
     volume: f64,

@@ -13,7 +13,7 @@ use crate::{
     tensor::{Tensor, Vector},
 };
 
-/// What a bond remembers: without weak planes its damage alone.
+/// Names of the history variables of a bond: without weak planes its damage alone.
 const HISTORY: [&str; 2] = ["damage", "micropotential"];
 
 /// Bond-based material whose bonds lose their stiffness by a damage φ of each, from 0 to 1.
@@ -278,9 +278,9 @@ impl<const D: usize> ContinuumDamage<D> {
 struct Growing {
     /// λ at which φ is 1.
     through: f64,
-    /// What D grows by with λ for it.
+    /// Derivative of D with respect to λ due to this bond.
     rate: f64,
-    /// What is dissipated with λ for it, with w of the beginning and of the end of the step.
+    /// Derivative of the dissipated energy with respect to λ due to this bond, with w of the beginning and of the end of the step.
     power: [f64; 2],
 }
 

@@ -10,7 +10,7 @@ const HORIZON: f64 = 2.3;
 const ONSET: f64 = 0.01;
 const ETA: f64 = 10.0;
 
-/// A complete family whose coefficients are scaled so that it stores what elasticity says of a dilatation.
+/// A complete family whose coefficients are scaled so that it stores the elastic energy of a dilatation.
 struct Point {
     law: Arc<dyn Law<3>>,
     bonds: Vec<Vector<3>>,
@@ -21,7 +21,7 @@ struct Point {
     dissipated: f64,
 }
 
-/// What a family answers.
+/// Response of a family.
 struct Answer {
     force: Vec<Vector<3>>,
     stored: f64,

@@ -22,7 +22,7 @@ pub struct Correspondence<const D: usize> {
     pub influence: Influence,
     /// Strength of the stabilising term relative to `D (D+2) μ / m`, that of the pairwise part of an LPS; 0 switches it off.
     pub stabilisation: f64,
-    /// What the term is beyond the first order; that of the linear law is a bond force.
+    /// Form of the term beyond the first order; that of the linear law is a bond force.
     pub control: ZeroEnergyControl,
     shear: f64,
     /// `√(ρ/(λ + 2 μ))` \[s/m\], of a drag.

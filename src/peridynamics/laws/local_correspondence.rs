@@ -56,7 +56,7 @@ impl<const D: usize> LocalCorrespondence<D> {
         self.band.as_ref().map_or(&*self.local, |band| &*band.law)
     }
 
-    /// What resists zero-energy modes, for scenes.
+    /// Choice of the zero-energy control in scenes.
     pub const CONTROL: Parameter = Parameter::words(
         "zero-energy-control",
         "What resists deformations that are not uniform: a bond force, one by the lengths of bonds alone, or a drag (in explicit dynamics).",

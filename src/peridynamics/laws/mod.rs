@@ -71,7 +71,7 @@ pub use viscoelastic::ViscoelasticCorrespondence;
 pub struct Parameter {
     /// Its key in a scene.
     pub key: &'static str,
-    /// What it is.
+    /// Description of the parameter.
     pub about: &'static str,
     /// Its value if left out; none if it has to be given.
     pub default: Option<f64>,
@@ -104,7 +104,7 @@ impl Parameter {
     }
 }
 
-/// Which Poisson ratios a law has.
+/// Poisson ratios that a law has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ratio {
     /// That of bonds that act alone.
@@ -113,7 +113,7 @@ pub enum Ratio {
     Any,
 }
 
-/// Elastic constants of a scene's material, of its dimension \[Pa\], and what else scenes give to all laws.
+/// Elastic constants of a scene's material, of its dimension \[Pa\], and other input of scenes for all laws.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constants {
     /// Lamé's λ.
@@ -124,7 +124,7 @@ pub struct Constants {
     pub influence: Influence,
     /// Shape of the stiffness of a bond over its length, for laws that have a choice \[1\].
     pub micromodulus: Micromodulus,
-    /// What the dimension stands for.
+    /// Kinematics that the dimension stands for.
     pub kinematics: Kinematics,
     /// Density ρ [kg/m^D].
     pub density: f64,
@@ -171,16 +171,16 @@ impl Constants {
 pub trait NamedLaw<const D: usize> {
     /// The key of the material.
     const KEY: &'static str;
-    /// What it is, in a sentence.
+    /// Description of the law, in a sentence.
     const ABOUT: &'static str;
-    /// Which Poisson ratios it has.
+    /// Poisson ratios that it has.
     const RATIO: Ratio;
     /// Bodies that it holds for.
     const KINEMATICS: &'static [Kinematics];
-    /// What it takes beside the elastic constants.
+    /// Parameters beside the elastic constants.
     const PARAMETERS: &'static [Parameter];
 
-    /// What stands against these numbers together, each within its limits, and the remedy; the first is the key of the one to change.
+    /// Returns the key of the number to change, with the reason and the remedy, if these numbers conflict although each is within its limits.
     fn conflict(_values: &[f64]) -> Option<(&'static str, String)> {
         None
     }
@@ -303,12 +303,12 @@ macro_rules! named_laws {
                 match self { $(Self::$law => <$law<1> as NamedLaw<1>>::KEY,)* }
             }
 
-            /// What it is.
+            /// Returns the description of the law.
             pub fn about(self) -> &'static str {
                 match self { $(Self::$law => <$law<1> as NamedLaw<1>>::ABOUT,)* }
             }
 
-            /// Which Poisson ratios it has.
+            /// Returns the Poisson ratios that it has.
             pub fn ratio(self) -> Ratio {
                 match self { $(Self::$law => <$law<1> as NamedLaw<1>>::RATIO,)* }
             }
@@ -318,7 +318,7 @@ macro_rules! named_laws {
                 match self { $(Self::$law => <$law<1> as NamedLaw<1>>::KINEMATICS,)* }
             }
 
-            /// What it takes beside the elastic constants.
+            /// Returns the parameters beside the elastic constants.
             pub fn parameters(self) -> &'static [Parameter] {
                 match self { $(Self::$law => <$law<1> as NamedLaw<1>>::PARAMETERS,)* }
             }

@@ -13,7 +13,7 @@ use crate::{
     tensor::{Tensor, Vector},
 };
 
-/// What a bond remembers, as much as there are arms, and one.
+/// Names of the history variables of a bond, as many as there are arms, and one.
 macro_rules! of_arms {
     ($($arm:literal)*) => {
         const HISTORY: [&str; PronySeries::ARMS + 1] = [

@@ -1,4 +1,4 @@
-//! What goes with the dilatation of a position-aware viscoelastic solid.
+//! Dilatational response of a position-aware viscoelastic solid.
 
 use super::Constants;
 use crate::{
@@ -6,7 +6,7 @@ use crate::{
     peridynamics::EnergyDensity,
 };
 
-/// What a point of a plate or a long body remembers, as much as there are arms, and one.
+/// Names of the history variables of a point of a plate or a long body, as many as there are arms, and one.
 macro_rules! of_arms {
     ($($arm:literal)*) => {
         const HISTORY: [&str; PronySeries::ARMS + 1] = [
@@ -34,7 +34,7 @@ pub(super) enum Dilatation {
     Plane {
         bulk: f64,
         shear: f64,
-        /// Whether no stress acts across.
+        /// True in plane stress: no stress acts across.
         is_free: bool,
     },
 }
@@ -54,7 +54,7 @@ impl Dilatation {
         }
     }
 
-    /// The names of what a point remembers.
+    /// The names of the history variables of a point.
     pub fn history(&self, series: &PronySeries) -> &'static [&'static str] {
         match self {
             Self::Solid { .. } => &[],

@@ -89,7 +89,7 @@ impl<const D: usize> NamedLaw<D> for PlasticCorrespondence<D> {
     }
 }
 
-/// How large strains and rotations may become.
+/// Admissible size of strains and rotations.
 pub(super) const STRAINS: Parameter = Parameter::words(
     "strains",
     "For \"small\" strains and rotations, or \"large\" ones: logarithmic strains and true stresses, slower.",

@@ -77,7 +77,7 @@ const fn time(key: &'static str, about: &'static str, default: Option<f64>) -> P
     }
 }
 
-/// What stands against the numbers of the arms together, and the key of the one to change.
+/// Returns the key of the number to change and the reason, if the numbers of the arms conflict with each other.
 pub(super) fn conflict(arms: &[f64]) -> Option<(&'static str, String)> {
     let shares: f64 = arms.iter().step_by(2).sum();
     (shares > 1.0).then(|| {

@@ -31,7 +31,7 @@ impl StiffnessMean {
     }
 }
 
-/// Why two materials have no bonds with each other.
+/// Refusal of a body of points of two materials that have no bonds with each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the materials {first} and {second} cannot share a body of points: {why}")]
 pub struct NoMixture {
@@ -39,7 +39,7 @@ pub struct NoMixture {
     pub first: u16,
     /// Number of the other.
     pub second: u16,
-    /// What stands against it.
+    /// Reason of the refusal.
     pub why: &'static str,
 }
 
@@ -78,7 +78,7 @@ fn ratio_of_kernels<const D: usize>(
     (first.is_finite() && first > 0.0 && ratios.all(is_same)).then_some(first)
 }
 
-/// What stands against two laws in one body.
+/// Returns the reason against two laws in one body; none if there is none.
 fn difference<const D: usize>(a: &dyn Law<D>, b: &dyn Law<D>) -> Option<&'static str> {
     let history = |law: &dyn Law<D>| law.force_state().map(|states| states.history());
     if a.name() != b.name() {

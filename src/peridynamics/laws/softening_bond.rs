@@ -138,7 +138,7 @@ impl<const D: usize> Calibrate<D> for SofteningBond<D> {
     }
 }
 
-/// What a bond remembers.
+/// Names of the history variables of a bond.
 const HISTORY: [&str; 2] = ["damage", "largest stretch"];
 
 impl<const D: usize> ForceState<D> for SofteningBond<D> {

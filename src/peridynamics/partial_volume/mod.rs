@@ -73,7 +73,7 @@ impl PartialVolume {
         }
     }
 
-    /// How far beyond the horizon the point of such a cell may lie and still have a share \[m\].
+    /// Returns the largest distance beyond the horizon at which the point of such a cell may lie and still have a share \[m\].
     pub fn reach_beyond<const D: usize>(self, cell: &BoxCell<D>) -> f64 {
         match self {
             Self::Full | Self::PdLammps => 0.0,
@@ -90,7 +90,7 @@ pub struct BoxCell<const D: usize> {
     high: Vector<D>,
 }
 
-/// Why there is no partial volume.
+/// Error in the computation of a partial volume.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PartialVolumeError {
     /// A box without volume.

@@ -10,7 +10,7 @@ use super::examine::{Outcome, ended, refused};
 use super::folder;
 use super::typed::{Typed, typed};
 
-/// How far a scene of which nothing was warned lies from classical elasticity, on the lines that it writes: root mean square of the difference of
+/// Distance of a scene of which nothing was warned from classical elasticity, on the lines that it writes: root mean square of the difference of
 /// displacements over that of the displacements.
 #[derive(Clone, Copy, Debug)]
 pub struct Agreement {
@@ -20,13 +20,13 @@ pub struct Agreement {
     pub from_fine: Option<f64>,
     /// Of elements alone on the same mesh from those on the fine one.
     pub elements_from_fine: f64,
-    /// What the proof predicts of the stress where it finds anything, and what nonlocality does to a smooth field: the square of the horizon over the
+    /// Error of the stress that the proof predicts where it finds anything, and effect of nonlocality on a smooth field: the square of the horizon over the
     /// body's smallest extent.
     pub predicted: f64,
 }
 
 impl Agreement {
-    /// Whether the scene agrees with elements alone but for what was predicted, or is no farther from the fine mesh than elements themselves.
+    /// Returns true if the scene agrees with elements alone but for what was predicted, or is no farther from the fine mesh than elements themselves.
     pub fn holds(&self) -> bool {
         let allowed = self.predicted;
         let of_fine = |d: f64| d <= 1.5 * self.elements_from_fine + allowed;
@@ -34,10 +34,10 @@ impl Agreement {
     }
 }
 
-/// How such a scene ended.
+/// Result of such a scene.
 pub struct Told {
     pub outcome: Outcome,
-    /// Whether anything was warned of.
+    /// True if anything was warned of.
     pub warned: bool,
     /// Of a scene at rest that is solved and warned of nothing.
     pub agreement: Option<Agreement>,

@@ -23,7 +23,7 @@ const MOST_WORK: usize = if IS_INSTRUMENTED {
 /// The relative residual above which a static scene does not count as solved. The solvers promise the scene's tolerance, 1e-10 by default.
 const RESIDUAL: f64 = 1e-8;
 
-/// How a case ended, if it ended as it should.
+/// Outcome of a case, if it ended as it should.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// It was solved.
@@ -81,7 +81,7 @@ pub fn examine(scene: AnyScene, folder: &Path) -> Outcome {
 /// As [`examine`], with the summary of a scene that is solved.
 ///
 /// # Errors
-/// How it ended else.
+/// The [`Outcome`] of any other scene.
 pub fn ended(scene: AnyScene, folder: &Path) -> Result<RunSummary, Outcome> {
     match scene {
         AnyScene::Bar(s) => run(*s, AnyScene::Bar, folder),

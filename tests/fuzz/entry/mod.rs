@@ -1,4 +1,4 @@
-//! What fuzzers call: each function takes bytes, and panics if bondline does anything but work or end in a named error.
+//! Entry points of fuzzers: each function takes bytes, and panics if bondline does anything but work or end in a named error.
 //!
 //! The targets of cargo-fuzz in `fuzz/` include this folder, and `tests/fuzz/main.rs` replays what they have found.
 //!
@@ -128,7 +128,7 @@ pub fn mesh_file(data: &[u8]) -> Outcome {
     }
 }
 
-/// How many cells a mesh file holds that all have a shape to compute with.
+/// Returns the number of cells of a mesh file, which all have a shape to compute with.
 fn cells<const D: usize>(path: &Path) -> Result<usize, MeshError> {
     let mesh = read::read::<D>(path)?;
     quality::check(&mesh)?;

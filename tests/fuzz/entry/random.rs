@@ -15,7 +15,7 @@ const PLATES: [&str; 4] = [
     "plate_binary.vtk",
 ];
 
-/// What the parts of a scene have to know of each other.
+/// Data that the parts of a scene share.
 struct Frame {
     dimension: usize,
     kind: Kind,
@@ -28,9 +28,9 @@ struct Frame {
     modulus: f64,
     density: f64,
     law: &'static str,
-    /// Whether bonds can break.
+    /// True if bonds can break.
     breaks: bool,
-    /// Whether there is a transition zone.
+    /// True if there is a transition zone.
     transition: bool,
     coupling: &'static str,
     from_file: bool,

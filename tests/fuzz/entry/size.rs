@@ -1,4 +1,4 @@
-//! Which scenes are small enough to be run by the thousand.
+//! Size limits of scenes that are run by the thousand.
 //!
 //! A scene that asks for more is not wrong; it is left out before anything of its size is made.
 
@@ -6,7 +6,7 @@ use bondline::scene::spec::{AxisSpec, MeshSpec, PointsSpec, SceneSpec, SolveSpec
 use bondline::scene::{Coordinates, Number};
 use toml::Spanned;
 
-/// What is instrumented for a fuzzer takes some twenty times as long, and has ten seconds.
+/// True in builds that are instrumented for a fuzzer: a scene takes some twenty times as long there, and has ten seconds.
 #[allow(unexpected_cfgs)] // cargo-fuzz sets it
 pub const IS_INSTRUMENTED: bool = cfg!(fuzzing);
 

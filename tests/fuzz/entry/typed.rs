@@ -95,7 +95,7 @@ fn peridynamics(
     Ok(is_typed)
 }
 
-/// How the scene is solved.
+/// Writes the table of the solver, if the scene has one.
 fn solution(frame: &Frame, rest: &mut String) {
     match frame.kind {
         Kind::Static => {}
@@ -425,7 +425,7 @@ fn gmsh(
     )
 }
 
-/// How the scene names its coupling, and whether that needs a transition zone.
+/// Chooses the coupling of the scene; true if it comes with a transition zone.
 fn coupling(u: &mut Unstructured<'_>) -> Result<(String, bool)> {
     let (text, meets) = *u.choose(&[
         ("", false),

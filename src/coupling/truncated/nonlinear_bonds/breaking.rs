@@ -17,10 +17,10 @@ use super::super::bond_kinematics::Part;
 /// Bonds per task.
 const CHUNK: usize = 1024;
 
-/// How many places of a bond are tried, from an end outside of the mesh on.
+/// Number of places of a bond that are tried, from an end outside of the mesh on.
 const PLACES: u32 = 16;
 
-/// What moves a place: sites and weights.
+/// Sites that move a place, with their weights.
 pub(super) type Carrier = Vec<(u32, f64)>;
 
 /// When bonds break.
@@ -28,7 +28,7 @@ pub(super) struct Breaking<const D: usize> {
     /// The value of t at the critical stretch of each bond.
     limit: Vec<f64>,
     never: Vec<bool>,
-    /// What counts of each bond, as one part.
+    /// Part of each bond that counts for its stretch.
     part: Vec<Part<D>>,
     /// Difference of displacement over each of them.
     difference: Transfer,
@@ -87,7 +87,7 @@ impl<const D: usize> Breaking<D> {
         })
     }
 
-    /// What moves the ends of a bond.
+    /// Returns the sites that move the ends of a bond, with their weights in the difference of displacement.
     pub fn carrier(&self, bond: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
         self.difference.row(bond)
     }

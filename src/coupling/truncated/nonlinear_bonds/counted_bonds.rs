@@ -1,6 +1,6 @@
 //! Which bonds and dilatations of a seam a process computes, and whose costs it counts.
 
-/// What a process computes of a seam.
+/// Bonds and dilatations of a seam that a process computes.
 #[derive(Debug, Default)]
 pub(super) struct OwnBonds {
     /// Parts whose elongation is known.
@@ -15,7 +15,7 @@ pub(super) struct OwnBonds {
     pub(super) counted_dilatations: Vec<bool>,
 }
 
-/// Whether a place is marked; all are where there are no marks.
+/// Returns true if a place is marked; all are where there are no marks.
 fn is_marked(marks: &[bool], place: usize) -> bool {
     marks.get(place).is_none_or(|is_marked| *is_marked)
 }

@@ -6,7 +6,7 @@
 use super::{NonlinearSeam, counted_bonds::OwnBonds};
 use crate::system::ExactSum;
 
-/// What the seam adds to what a process has to know.
+/// Contribution of the seam to the data that a process needs.
 pub(in crate::coupling) struct ReachOfSeam {
     own: OwnBonds,
     /// Points whose bonds in the body's pass are followed.
@@ -14,7 +14,7 @@ pub(in crate::coupling) struct ReachOfSeam {
 }
 
 impl<const D: usize> NonlinearSeam<D> {
-    /// What the forces of `own` sites take of the seam; marks the `sites` whose displacements that takes.
+    /// Returns the part of the seam on which the forces of `own` sites depend; marks the `sites` whose displacements it takes.
     pub(in crate::coupling) fn reach_from(
         &self,
         own: &[bool],
