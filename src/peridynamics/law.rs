@@ -58,14 +58,10 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
     }
 
     /// The local law that finite elements of this material have; none if they are linear, with the collapsed tensor of the bonds.
-    fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
-        None
-    }
+    fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>>;
 
-    /// Returns true if the force with linear kinematics is that of [`Law::linearised`], whatever the displacement and the time. A law that does not say so is computed as nonlinear.
-    fn is_linear(&self) -> bool {
-        false
-    }
+    /// Range in which the force with linear kinematics is that of [`Law::linearised`].
+    fn linearity(&self) -> Linearity;
 
     /// Returns the departure from [`Law::linearised`] under a uniform mechanical `strain` that is reached at once and then held for a `time` \[s\]: finite elements without a [`Law::local_law`] and rows at a seam lack it. Bonds that break by a scene's
     /// criterion are left out. Every law says so, since nothing else would warn of elements that go on as if they were elastic.
@@ -73,17 +69,6 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
 
     /// Returns true if bonds can break: [`Law::force_state`] then takes families that have lost some.
     fn has_breakable_bonds(&self) -> bool;
-
-    /// Returns true if [`Law::is_linear`] holds as long as nothing is damaged, so that a seam beside undamaged bonds is in equilibrium. A law that does not say so takes part in no coupling by force.
-    fn is_linear_until_damaged(&self) -> bool {
-        self.is_linear()
-    }
-
-    /// Returns true if its bonds lose their stiffness by a damage that it keeps, [`crate::peridynamics::HistoryLayout::damage`].
-    fn damages(&self) -> bool {
-        let states = self.force_state();
-        states.is_some_and(|states| states.history().damage.is_some())
-    }
 
     /// Returns the calibration of its constants to the lattice at hand, if they follow from it.
     fn calibrate(&self) -> Option<&dyn Calibrate<D>> {
@@ -97,6 +82,35 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
 
     /// Returns the energy stored in the bonds of a continuous family, and the energy of breaking them, to second order in the stretch, if that is known in closed form; `horizon` is δ \[m\].
     fn bond_energy(&self, horizon: f64) -> Option<BondEnergy>;
+}
+
+/// Range in which the force of a law with linear kinematics is that of its linearisation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Linearity {
+    /// At any displacement and time.
+    Always,
+    /// As long as nothing is damaged, so that a seam beside undamaged bonds is in equilibrium.
+    UntilDamaged,
+    /// To first order only; such a law takes part in no coupling by force.
+    AtRest,
+}
+
+impl<const D: usize> dyn Law<D> + '_ {
+    /// Returns true if the force with linear kinematics is linear at any displacement and time.
+    pub fn is_linear(&self) -> bool {
+        self.linearity() == Linearity::Always
+    }
+
+    /// Returns true if it is as long as nothing is damaged.
+    pub fn is_linear_until_damaged(&self) -> bool {
+        self.linearity() != Linearity::AtRest
+    }
+
+    /// Returns true if bonds or points lose their stiffness by a damage of the law, [`crate::peridynamics::HistoryLayout::damage`].
+    pub fn damages(&self) -> bool {
+        let states = self.force_state();
+        states.is_some_and(|states| states.history().damage.is_some())
+    }
 }
 
 /// Several materials behind one law, by their numbers.

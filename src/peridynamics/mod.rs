@@ -74,7 +74,7 @@ pub use force_state::{
 pub use horizon::Horizon;
 pub use influence::{Influence, Micromodulus};
 pub use lattice_families::Wanted;
-pub use law::{Accelerator, Calibrate, Law, Mixture};
+pub use law::{Accelerator, Calibrate, Law, Linearity, Mixture};
 pub use laws::{
     BondBased, Correspondence, Hardening, LinearPeridynamicSolid, Maxwell, NoMixture,
     PositionAwareSolid, Several, StiffnessMean,

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use super::{Constants, NamedLaw, Parameter, Ratio};
 use crate::{
-    material::Kinematics,
+    material::{Kinematics, LocalLaw},
     peridynamics::{
         Accelerator, BondEnergy, DeformedFamily, Departure, EnergyDensity, Family, ForceState,
-        HistoryLayout, Influence, Law, LinearForceState, Micromodulus, MomentConditions, Past,
-        PdError, Present, ShellTarget, StatePart,
+        HistoryLayout, Influence, Law, LinearForceState, Linearity, Micromodulus, MomentConditions,
+        Past, PdError, Present, ShellTarget, StatePart,
         influence::{Alpha, Degree},
     },
     tensor::{Tensor, Tensor4, Vector},
@@ -70,8 +70,12 @@ impl<const D: usize> Law<D> for BondBased<D> {
         Some(Accelerator::Pairwise)
     }
 
-    fn is_linear(&self) -> bool {
-        true
+    fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
+        None
+    }
+
+    fn linearity(&self) -> Linearity {
+        Linearity::Always
     }
 
     fn departure(&self, _strain: &Tensor<D>, _time: f64) -> Departure {

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
-    material::Kinematics,
+    material::{Kinematics, LocalLaw},
     peridynamics::{
         BondEnergy, DeformedFamily, Departure, EnergyDensity, ForceState, HistoryLayout,
-        KeptDamage, Law, LinearForceState, Micromodulus, Past, Present,
+        KeptDamage, Law, LinearForceState, Linearity, Micromodulus, Past, Present,
         departure::DAMAGED_ELEMENTS,
     },
     tensor::{Tensor, Vector},
@@ -132,8 +132,12 @@ impl<const D: usize> Law<D> for ContinuumDamage<D> {
         Some(self)
     }
 
-    fn is_linear_until_damaged(&self) -> bool {
-        true
+    fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
+        None
+    }
+
+    fn linearity(&self) -> Linearity {
+        Linearity::UntilDamaged
     }
 
     /// By `V₀ μ•w` of a continuous family. With weak planes of the normal m, and ⟨·⟩ the mean over all directions n,

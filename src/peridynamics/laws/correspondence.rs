@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::{Constants, NamedLaw, Parameter, Ratio};
 use crate::{
-    material::Kinematics,
+    material::{Kinematics, LocalLaw},
     peridynamics::{
-        BondEnergy, Departure, Family, ForceState, Influence, Law, LinearForceState,
+        BondEnergy, Departure, Family, ForceState, Influence, Law, LinearForceState, Linearity,
         MomentConditions, PdError, ShellTarget, StatePart, ZeroEnergyControl, invert_shape_tensor,
     },
     tensor::{Tensor, Tensor4, Vector},
@@ -91,8 +91,12 @@ impl<const D: usize> Law<D> for Correspondence<D> {
         None
     }
 
-    fn is_linear(&self) -> bool {
-        true
+    fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
+        None
+    }
+
+    fn linearity(&self) -> Linearity {
+        Linearity::Always
     }
 
     fn departure(&self, _strain: &Tensor<D>, _time: f64) -> Departure {

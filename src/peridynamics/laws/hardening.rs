@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
-    material::Kinematics,
+    material::{Kinematics, LocalLaw},
     peridynamics::{
         BondEnergy, DeformedFamily, Departure, EnergyDensity, ForceState, HistoryLayout, Law,
-        LinearForceState, Micromodulus, Past, Present, departure::stretch_of_cubic,
+        LinearForceState, Linearity, Micromodulus, Past, Present, departure::stretch_of_cubic,
         largest_extension,
     },
     tensor::{Tensor, Vector},
@@ -57,6 +57,14 @@ impl<const D: usize> Law<D> for Hardening<D> {
 
     fn force_state(&self) -> Option<&dyn ForceState<D>> {
         Some(self)
+    }
+
+    fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
+        None
+    }
+
+    fn linearity(&self) -> Linearity {
+        Linearity::AtRest
     }
 
     fn departure(&self, strain: &Tensor<D>, _time: f64) -> Departure {

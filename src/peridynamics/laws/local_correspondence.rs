@@ -7,7 +7,7 @@ use crate::{
     material::LocalLaw,
     peridynamics::{
         BondEnergy, Calibrate, CauchyStress, DeformedFamily, Departure, EnergyDensity, ForceState,
-        HistoryLayout, KeptDamage, Law, LinearForceState, Past, PointStress, Present,
+        HistoryLayout, KeptDamage, Law, LinearForceState, Linearity, Past, PointStress, Present,
         ZeroEnergyControl,
         bond_force::{conjugate, felt},
         departure,
@@ -79,6 +79,10 @@ impl<const D: usize> Law<D> for LocalCorrespondence<D> {
 
     fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
         Some(Arc::clone(&self.local))
+    }
+
+    fn linearity(&self) -> Linearity {
+        Linearity::AtRest
     }
 
     fn departure(&self, strain: &Tensor<D>, time: f64) -> Departure {

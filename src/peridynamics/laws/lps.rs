@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use super::{Constants, NamedLaw, Parameter, Ratio};
 use crate::{
-    material::Kinematics,
+    material::{Kinematics, LocalLaw},
     peridynamics::{
         Accelerator, BondEnergy, DeformedFamily, Departure, EnergyDensity, Family, ForceState,
-        HistoryLayout, Influence, Law, LinearForceState, MomentConditions, Past, PdError, Present,
-        ShellTarget, StatePart, moment_fitted_weights,
+        HistoryLayout, Influence, Law, LinearForceState, Linearity, MomentConditions, Past,
+        PdError, Present, ShellTarget, StatePart, moment_fitted_weights,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -77,8 +77,12 @@ impl<const D: usize> Law<D> for LinearPeridynamicSolid<D> {
         })
     }
 
-    fn is_linear(&self) -> bool {
-        true
+    fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
+        None
+    }
+
+    fn linearity(&self) -> Linearity {
+        Linearity::Always
     }
 
     fn departure(&self, _strain: &Tensor<D>, _time: f64) -> Departure {

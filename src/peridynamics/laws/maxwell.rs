@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
-    material::{Arm, Kinematics},
+    material::{Arm, Kinematics, LocalLaw},
     peridynamics::{
         BondEnergy, DeformedFamily, Departure, EnergyDensity, ForceState, HistoryLayout, Law,
-        LinearForceState, Micromodulus, Past, Present,
+        LinearForceState, Linearity, Micromodulus, Past, Present,
     },
     tensor::{Tensor, Vector},
 };
@@ -71,6 +71,14 @@ impl<const D: usize> Law<D> for Maxwell<D> {
 
     fn force_state(&self) -> Option<&dyn ForceState<D>> {
         Some(self)
+    }
+
+    fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
+        None
+    }
+
+    fn linearity(&self) -> Linearity {
+        Linearity::AtRest
     }
 
     fn departure(&self, _strain: &Tensor<D>, time: f64) -> Departure {

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use super::{Constants, NamedLaw, Parameter, Ratio};
 use crate::{
-    material::Kinematics,
+    material::{Kinematics, LocalLaw},
     peridynamics::{
         BondEnergy, CalibrationFields, DeformedFamily, Departure, EnergyDensity, Family,
-        ForceState, HistoryLayout, Influence, Law, LinearForceState, MomentConditions, Past,
-        PdError, Present, ShellTarget, StatePart, StressFit,
+        ForceState, HistoryLayout, Influence, Law, LinearForceState, Linearity, MomentConditions,
+        Past, PdError, Present, ShellTarget, StatePart, StressFit,
         position_aware_influence::{self, PositionAware},
     },
     tensor::{Tensor, Tensor4, Vector},
@@ -144,8 +144,12 @@ impl<const D: usize> Law<D> for PositionAwareSolid<D> {
         Some(self)
     }
 
-    fn is_linear(&self) -> bool {
-        true
+    fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
+        None
+    }
+
+    fn linearity(&self) -> Linearity {
+        Linearity::Always
     }
 
     fn departure(&self, _strain: &Tensor<D>, _time: f64) -> Departure {

@@ -8,7 +8,7 @@ use crate::{
     material::{Kinematics, LocalLaw, PronySeries},
     peridynamics::{
         BondEnergy, CauchyStress, DeformedFamily, Departure, EnergyDensity, ForceState,
-        HistoryLayout, Law, LinearForceState, Past, Present, departure,
+        HistoryLayout, Law, LinearForceState, Linearity, Past, Present, departure,
     },
     tensor::{Tensor, Vector},
 };
@@ -102,6 +102,10 @@ impl<const D: usize> Law<D> for PositionAwareViscoelasticSolid<D> {
 
     fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
         Some(Arc::clone(&self.local))
+    }
+
+    fn linearity(&self) -> Linearity {
+        Linearity::AtRest
     }
 
     fn departure(&self, strain: &Tensor<D>, time: f64) -> Departure {

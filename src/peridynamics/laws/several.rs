@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use crate::{
+    material::LocalLaw,
     peridynamics::{
         Accelerator, BondEnergy, CauchyStress, DeformedFamily, Departure, EnergyDensity, Family,
-        ForceState, HistoryLayout, Influence, Law, LinearForceState, Mixture, MomentConditions,
-        Past, PdError, PointStress, Present, ShellTarget, StatePart,
+        ForceState, HistoryLayout, Influence, Law, LinearForceState, Linearity, Mixture,
+        MomentConditions, Past, PdError, PointStress, Present, ShellTarget, StatePart,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -194,8 +195,20 @@ impl<const D: usize> Law<D> for Several<D> {
             .then_some(first)?
     }
 
-    fn is_linear(&self) -> bool {
-        self.in_use().all(|law| law.is_linear())
+    fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
+        None
+    }
+
+    fn linearity(&self) -> Linearity {
+        let all = |of: fn(&dyn Law<D>) -> bool| self.in_use().all(of);
+        match (
+            all(|law| law.is_linear()),
+            all(|law| law.is_linear_until_damaged()),
+        ) {
+            (true, _) => Linearity::Always,
+            (false, true) => Linearity::UntilDamaged,
+            (false, false) => Linearity::AtRest,
+        }
     }
 
     /// Of the material that departs the furthest.
@@ -212,10 +225,6 @@ impl<const D: usize> Law<D> for Several<D> {
 
     fn has_breakable_bonds(&self) -> bool {
         self.in_use().all(|law| law.has_breakable_bonds())
-    }
-
-    fn is_linear_until_damaged(&self) -> bool {
-        self.in_use().all(|law| law.is_linear_until_damaged())
     }
 
     fn several(&self) -> Option<&dyn Mixture<D>> {

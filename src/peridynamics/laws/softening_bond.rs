@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
-    material::Kinematics,
+    material::{Kinematics, LocalLaw},
     peridynamics::{
         BondEnergy, Calibrate, DeformedFamily, Departure, EnergyDensity, ForceState, HistoryLayout,
-        KeptDamage, Law, LinearForceState, Micromodulus, Past, Present,
+        KeptDamage, Law, LinearForceState, Linearity, Micromodulus, Past, Present,
         departure::DAMAGED_ELEMENTS,
         largest_extension,
         softening::{Calibration, CalibrationError, Envelope, RegularFamily, Softening},
@@ -89,8 +89,12 @@ impl<const D: usize> Law<D> for SofteningBond<D> {
         Some(self)
     }
 
-    fn is_linear_until_damaged(&self) -> bool {
-        true
+    fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
+        None
+    }
+
+    fn linearity(&self) -> Linearity {
+        Linearity::UntilDamaged
     }
 
     fn departure(&self, strain: &Tensor<D>, _time: f64) -> Departure {
