@@ -12,7 +12,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use bondline::coupling::Zone;
+use bondline::model::Zone;
 use bondline::observe::report::{Columns, Format, Table, TableRow, exit_code, render};
 use bondline_terminal::progress::TerminalProgress;
 use bondline_verify::bar::{self, Bar, ENCLOSED, EXACT, METHODS, PLANE_MEANS, Write};

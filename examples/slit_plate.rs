@@ -15,8 +15,8 @@ use std::{
 };
 
 use bondline::{
-    coupling::{CellRole, Sampler, SiteKind},
     fem,
+    model::{CellRole, Sampler, SiteKind},
     observe::{
         report::{Columns, Format, Table, TableRow, exit_code, render},
         summary::RunSummary,

@@ -124,12 +124,12 @@
 //! A [`Problem`] says what the model is, a [`Model`] lays out its sites and bonds, an [`Operator`] gives the rows of the stiffness, a [`StaticProblem`] is solved.
 //!
 //! ```
-//! use bondline::coupling::{HorizonField, PointSource, Surfaces};
 //! use bondline::mesh::{CellShape, Mesh};
+//! use bondline::model::{ElasticCells, HorizonField, PointSource, Surfaces, ZonedBody};
 //! use bondline::peridynamics::{BondBased, BondWeights, PartialVolume};
 //! use bondline::solve::statics::{StaticParams, solve};
 //! use bondline::tensor::{Tensor4, Vector, padded};
-//! use bondline::{Coupling, Micromodulus, Model, Peridynamics, Problem, Silent, Splice, StaticProblem, Zone};
+//! use bondline::{Coupling, Micromodulus, Model, Peridynamics, Silent, Splice, StaticProblem, Zone, ZoneLayout};
 //! use std::sync::Arc;
 //!
 //! // a bar of 30 cells of length 1, peridynamic in the middle third, E = 3
@@ -137,11 +137,13 @@
 //! mesh.nodes = (0..=30).map(|i| Vector::<1>::new(f64::from(i))).collect();
 //! (0..30u32).for_each(|i| mesh.push_cell(CellShape::Line2, &[i, i + 1]));
 //! let zones = (0..30).map(|c| if (10..20).contains(&c) { Zone::Nonlocal } else { Zone::Local });
-//! let problem = Problem {
+//! let body = ZonedBody {
 //!     zones: zones.collect(),
-//!     tensors: vec![Tensor4::isotropic(1.0, 1.0)],
-//!     cell_material: vec![0; 30],
-//!     peridynamic_material: 0,
+//!     elastic: ElasticCells {
+//!         tensors: vec![Tensor4::isotropic(1.0, 1.0)],
+//!         material: vec![0; 30],
+//!         of_points: 0,
+//!     },
 //!     peridynamics: Some(Peridynamics {
 //!         law: Arc::new(BondBased::new(Micromodulus::Constant, 1.0)),
 //!         horizon: HorizonField::Uniform(3.0),
@@ -152,10 +154,10 @@
 //!         voids: vec![],
 //!         surfaces: Surfaces::Cut,
 //!     }),
-//!     coupling: Box::new(Splice),
 //!     mesh,
 //! };
-//! let (model, coupling) = Model::new(problem, &Silent)?;
+//! let coupling = Splice;
+//! let model = Model::new(body, &coupling, None, &Silent)?;
 //! let operator = coupling.operator(&model)?;
 //! let stiffness = model.assemble(operator.as_ref(), &Silent);
 //!
@@ -192,6 +194,7 @@ mod dimension;
 pub mod fem;
 pub mod material;
 pub mod mesh;
+pub mod model;
 pub mod observe;
 mod parallel;
 pub mod peridynamics;
@@ -206,11 +209,14 @@ pub mod system;
 pub mod tensor;
 
 pub use coupling::{
-    Blending, BlendingFunction, CellRole, Coupling, FitDegree, Local, Model, ModelError, Nonlocal,
-    Operator, PartialStressElements, PartialStressMeshfree, Peridynamics, PointSource, Problem,
-    Sampler, Site, SiteKind, Splice, Zone,
+    Blending, BlendingFunction, Coupling, Local, Nonlocal, Operator, PartialStressElements,
+    PartialStressMeshfree, Problem, Splice,
 };
 pub use mesh::{CellShape, Mesh, MeshError};
+pub use model::{
+    CellRole, FitDegree, Model, ModelError, Peridynamics, PointSource, Sampler, Site, SiteKind,
+    Zone, ZoneLayout,
+};
 pub use observe::summary::RunSummary;
 pub use peridynamics::{
     BondBased, BondWeights, Correspondence, Influence, LinearForceState, LinearPeridynamicSolid,

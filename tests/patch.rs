@@ -4,9 +4,10 @@ use std::path::Path;
 
 use bondline::{
     coupling::{
-        CoupledSystem, FitDegree,
+        CoupledSystem,
         semidiscrete::{BondBehaviour, SystemError},
     },
+    model::FitDegree,
     observe::report::{Table, TableRow, Verdict, exit_code},
     peridynamics::{
         Micromodulus,

@@ -1,6 +1,6 @@
 //! Wrong scenes: each message names the place, the value and the remedy, and underlines the token at fault.
 
-use bondline::coupling::Zone;
+use bondline::model::Zone;
 use bondline::run::AnyScene;
 use bondline::scene::{SceneError, SceneErrorKind, SceneSpec, Source, Template};
 

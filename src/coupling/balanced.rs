@@ -2,11 +2,12 @@
 
 use crate::{
     coupling::{
-        BlendingFunction, CellRole, Coupling, Model, ModelError, Operator, Rows, Zone,
+        BlendingFunction, Coupling, Operator, Rows,
         blending::{self, Blended, SpliceShare},
     },
     dimension,
     mesh::Mesh,
+    model::{CellRole, Model, ModelError, Zone, ZoneLayout},
     peridynamics::PdBody,
 };
 
@@ -25,7 +26,7 @@ pub struct Balanced {
     pub function: Option<BlendingFunction>,
 }
 
-impl<const D: usize> Coupling<D> for Balanced {
+impl<const D: usize> ZoneLayout<D> for Balanced {
     fn name(&self) -> &'static str {
         "balanced"
     }
@@ -41,7 +42,9 @@ impl<const D: usize> Coupling<D> for Balanced {
     fn takes_deviators(&self) -> bool {
         true
     }
+}
 
+impl<const D: usize> Coupling<D> for Balanced {
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         static ROWS: (Rows<Balanced, 1>, Rows<Balanced, 2>, Rows<Balanced, 3>) =
             (Balanced::rows, Balanced::rows, Balanced::rows);

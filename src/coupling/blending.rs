@@ -2,15 +2,15 @@
 
 use crate::{
     assembly::Row,
-    coupling::{
-        CellRole, Coupling, ExactStresses, MixedRows, Model, ModelError, Operator, Rows, SeamBonds,
-        Zone,
+    coupling::{Coupling, ExactStresses, MixedRows, Operator, Rows, SeamBonds},
+    dimension,
+    mesh::Mesh,
+    model::{
+        CellRole, Model, ModelError, Zone, ZoneLayout,
         held_families::depth_of_seam,
         least_squares_gradient::{self, DerivativeWeights},
         zone_distance::Edge,
     },
-    dimension,
-    mesh::Mesh,
     parallel,
     peridynamics::{LinearForceState, PdBody},
     tensor::{Tensor, Vector},
@@ -55,7 +55,7 @@ pub struct Blending {
     pub function: BlendingFunction,
 }
 
-impl<const D: usize> Coupling<D> for Blending {
+impl<const D: usize> ZoneLayout<D> for Blending {
     fn name(&self) -> &'static str {
         "blending"
     }
@@ -76,7 +76,9 @@ impl<const D: usize> Coupling<D> for Blending {
     fn families_of_all(&self, law: &dyn LinearForceState<D>) -> Option<usize> {
         Some(depth_of_seam(law.is_pairwise()))
     }
+}
 
+impl<const D: usize> Coupling<D> for Blending {
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         static ROWS: (Rows<Blending, 1>, Rows<Blending, 2>, Rows<Blending, 3>) =
             (Blending::rows, Blending::rows, Blending::rows);

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use crate::{
-    coupling::{Model, ModelError},
     material::LocalLaw,
+    model::{Model, ModelError},
     peridynamics::{Accelerator, BondWeights, CauchyBorn, Law, bond_force::BondKinematics},
 };
 
@@ -21,7 +21,7 @@ impl<const D: usize> Model<D> {
             return Ok(());
         };
         let refused = |what, remedy| Err(ModelError::Unsupported { what, remedy });
-        let [(factors, horizon)] = &self.factors[..] else {
+        let [(factors, horizon)] = &self.lattices.factors[..] else {
             return refused(
                 "elements with the Cauchy–Born law of points that are not there, or of several lattices",
                 "draw one nonlocal zone with one horizon, or leave peridynamics.elements out",
@@ -42,12 +42,12 @@ impl<const D: usize> Model<D> {
                 .collect(),
             None => vec![(self.peridynamic_material(), p.law.as_ref())],
         };
-        let mut laws: Vec<Option<Arc<dyn LocalLaw<D>>>> = vec![None; self.tensors.len()];
+        let mut laws: Vec<Option<Arc<dyn LocalLaw<D>>>> = vec![None; self.elastic.tensors.len()];
         let mut dilatation = None;
         for (material, law) in of_points {
             let (bonds, carried) = factors.bonds(law.linearised(), *horizon)?;
             // the rows of the elements have this one, so that the law is what they lack of it
-            let tangent = self.tensors[usize::from(material)];
+            let tangent = self.elastic.tensors[usize::from(material)];
             let mut difference = carried;
             difference.add_scaled(-1.0, &tangent);
             if difference.amax() > ROUND_OFF * tangent.amax() {
@@ -73,19 +73,19 @@ impl<const D: usize> Model<D> {
             }
             laws[usize::from(material)] = Some(law);
         }
-        self.cauchy_born = laws;
-        self.dilatation = dilatation;
+        self.cauchy_born.laws = laws;
+        self.cauchy_born.dilatation = dilatation;
         Ok(())
     }
 
     /// Returns true if elements follow the bonds, [`Model::follow_bonds`].
     pub fn follows_bonds(&self) -> bool {
-        !self.cauchy_born.is_empty()
+        !self.cauchy_born.laws.is_empty()
     }
 
     /// Returns true if the elements of a material, by its number, follow the bonds.
     pub fn follows_bonds_in(&self, material: u16) -> bool {
-        let law = self.cauchy_born.get(usize::from(material));
+        let law = self.cauchy_born.laws.get(usize::from(material));
         law.is_some_and(Option::is_some)
     }
 
@@ -96,7 +96,7 @@ impl<const D: usize> Model<D> {
         material: u16,
     ) -> Option<&'a Arc<dyn LocalLaw<D>>> {
         let of = |laws: &'a [Option<Arc<dyn LocalLaw<D>>>]| laws.get(usize::from(material));
-        let own = of(&self.cauchy_born).and_then(Option::as_ref);
+        let own = of(&self.cauchy_born.laws).and_then(Option::as_ref);
         own.or_else(|| of(typed).and_then(Option::as_ref))
     }
 
@@ -113,7 +113,7 @@ impl<const D: usize> Model<D> {
         &self,
         typed: &[Option<Arc<dyn LocalLaw<D>>>],
     ) -> Vec<Option<Arc<dyn LocalLaw<D>>>> {
-        let materials = 0..self.tensors.len() as u16;
+        let materials = 0..self.elastic.tensors.len() as u16;
         materials
             .map(|m| self.local_law(typed, m).cloned())
             .collect()

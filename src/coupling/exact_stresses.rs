@@ -18,7 +18,7 @@
 
 use std::sync::Arc;
 
-use super::model::Model;
+use crate::model::Model;
 use crate::{
     parallel,
     peridynamics::{Law, MemorylessFamily, PdBody, bond_force::BondKinematics},

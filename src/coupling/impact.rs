@@ -25,7 +25,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::tensor::Vector;
-use crate::{coupling::Model, parallel};
+use crate::{model::Model, parallel};
 
 mod clearance;
 mod shape;
@@ -92,13 +92,14 @@ pub struct ContactPatch {
 impl<const D: usize> Impact<D> {
     /// Contact of the sites of `model`, which counts `counted` times in the bounds of eigenvalues and row sums: [`RESOLVED`] in motion, 1 in load steps.
     pub fn new(model: &Model<D>, impactors: Vec<RigidImpactor<D>>, counted: f64) -> Self {
-        let modulus = |material: u16| model.tensors[usize::from(material)].get(0, 0, 0, 0);
+        let modulus = |material: u16| model.elastic.tensors[usize::from(material)].get(0, 0, 0, 0);
         let by_volume = model
             .tributary()
             .masses(model.peridynamic_material(), modulus);
         let sizes = clearance::sizes(model);
         let stiffness = by_volume.iter().zip(&sizes).map(|(cv, h)| cv / (h * h));
         let largest = model
+            .elastic
             .tensors
             .iter()
             .map(|c| c.get(0, 0, 0, 0))

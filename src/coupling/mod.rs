@@ -10,24 +10,14 @@
 //! | `truncated_families/` | the same of laws whose points have a stress: symmetric, patch-exact at any strain, in equilibrium | `docs/truncated.md` |
 //! | `partial_stress.rs`, `partial_stress_elements.rs` | partial stress, meshfree and in finite elements | eq. (2.19), (2.20), (2.29), sections 7.2, 7.3 |
 //! | `exact_stresses.rs` | partial stresses of geometrically exact bonds | eq. (2.19) |
-//! | `problem.rs` | what a coupled problem consists of | |
-//! | `model.rs`, `sites.rs`, `rows.rs` | shared: sites, families, what completes them; rows of elements, the assembled stiffness | |
-//! | `distribution.rs` | which of several processes has which sites | |
-//! | `shared_families.rs`, `shared_body.rs`, `held_families.rs` | families that are spread over processes; which of them each has | |
-//! | `multi_lattice.rs`, `completed_lattice.rs`, `lattice_axes.rs`, `lattice_box.rs` | shared: one lattice of points, or several that elements keep apart; its axes; its points in a box | |
-//! | `point_generation.rs`, `point_cloud.rs`, `bond_cutting.rs` | shared: where PD points lie, which are needed, which bonds are cut and how they are weighted | |
-//! | `point_materials.rs` | shared: the materials of points, in a body of several | |
-//! | `seam_order.rs` | shared: cells of second order, which are linear at the seam | |
-//! | `recovery.rs` | shared: second derivatives at places in elements | \[ZienkiewiczZhu1992\] |
-//! | `least_squares_gradient.rs`, `interface_interpolation.rs`, `zone_distance.rs`, `field_evaluation.rs`, `bins.rs` | shared: least squares, nodes that follow points, distances, displacements anywhere | |
-//! | `sparse_factors.rs` | factors of the conditions that the fits at a seam have to meet | |
+//! | `problem.rs` | a body with its zones and a coupling | |
+//! | `rows.rs` | shared: rows of elements, the assembled stiffness | |
 //! | `error_indicator.rs` | where the local model would be wrong, and where a bond could break | |
 //! | `cauchy_born.rs` | elements that follow the bonds of the points at any stretch | eq. (2.10) |
-//! | `tributary/` | the part of the body that each site stands for: its mass, and the loads on it | |
 //! | `semidiscrete.rs`, `semidiscrete/` | a model that moves: bonds that stretch and break beside the rows of the rest | |
-//! | `loaded_places.rs` | the elements and the cells of points that facets belong to | |
 //! | `impact.rs`, `impact/` | rigid impactors that push the sites of a model that moves, as a force term | |
 //! | `state_transfer.rs` | a motion handed from one layout of zones to another | |
+//! | `crate::model` | sites, points, families and the transfer, on which all methods stand | |
 //! | `crate::assembly` | rows, and places expressed through sites | |
 //!
 //! Every method is *force-based*: each site has one row, its internal force by the model that holds there. A row that vanishes under
@@ -36,159 +26,45 @@
 //! A method is one file with a [`Coupling`], one line here and its entry in the scene.
 
 pub mod balanced;
-mod bins;
 pub mod blending;
-mod bond_cutting;
 mod cauchy_born;
-mod completed_lattice;
-mod distribution;
 pub mod error_indicator;
 mod exact_stresses;
-pub mod field_evaluation;
-mod held_families;
 pub mod impact;
-mod interface_interpolation;
-mod lattice_axes;
-mod lattice_box;
-pub mod least_squares_gradient;
-pub(crate) mod loaded_places;
-pub mod model;
-mod multi_lattice;
+#[cfg(test)]
+mod layout_tests;
 pub mod partial_stress;
 pub mod partial_stress_elements;
-pub mod point_cloud;
-mod point_generation;
-mod point_materials;
 pub mod problem;
-mod recovery;
 mod rows;
-mod seam_order;
 pub mod semidiscrete;
-mod shared_body;
-pub mod shared_families;
-mod sites;
-mod sparse_factors;
 pub mod splice;
 pub mod state_transfer;
-pub mod tributary;
 pub mod truncated;
 pub mod truncated_families;
 pub mod uncoupled;
-pub mod zone_distance;
 
 pub use balanced::Balanced;
-pub use bins::{Bins, bin_of};
 pub use blending::{Blending, BlendingFunction};
 pub use exact_stresses::ExactStresses;
-pub use field_evaluation::{Carrier, Sampler};
 pub use impact::{ContactPatch, Impact, ImpactorShape, RigidImpactor};
-pub use least_squares_gradient::FitDegree;
-pub use model::{Model, Site, SiteKind};
 pub use partial_stress::PartialStressMeshfree;
 pub use partial_stress_elements::PartialStressElements;
-pub use problem::{
-    HorizonField, Lattice, ModelError, Peridynamics, PointSource, Problem, ScalarField, Surfaces,
-};
+pub use problem::{LaidOut, Problem};
 pub use semidiscrete::CoupledSystem;
-pub use shared_families::{Distribution, SharedFamilies};
 pub use splice::Splice;
 pub use state_transfer::{BrokenBonds, Carried, CarryError, Carrying};
-pub use tributary::Tributary;
 pub use truncated::{NonlinearSeam, Truncated};
 pub use truncated_families::TruncatedFamilies;
 pub use uncoupled::{Local, Nonlocal};
 
-use crate::{assembly::Row, mesh::Mesh, peridynamics::LinearForceState, system::Symmetry};
-
-/// The model that a scene asks for in a cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Zone {
-    /// Classical elasticity by finite elements, `B_0`.
-    Local,
-    /// Between the two: blending region `B_b` or partial-stress region `B_ps`.
-    Transition,
-    /// Peridynamics, `B_pd`.
-    Nonlocal,
-}
-
-/// Role of a cell in a coupling.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum CellRole {
-    /// A finite element with the local law.
-    Element,
-    /// A finite element whose stress is the partial stress at its Gauss points.
-    StressElement,
-    /// Filled with peridynamic points.
-    Points,
-}
-
-/// Extent to which families have to be complete around the sites that are peridynamic points.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reach {
-    /// Their own families.
-    Own,
-    /// The families of their neighbours too: force states or stresses of the neighbours enter the row.
-    Neighbours,
-}
-
-/// Which nodes of finite elements at the seam are sites, and which follow the sites around them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Interface {
-    /// Nodes of the seam are sites; the elements overlap into the peridynamic zone by one cell, whose far nodes follow the PD points around them.
-    Overlap,
-    /// Nodes of the seam follow a least-squares fit to the sites within a horizon, [SAND2015-7998] section 7.3.
-    Constrained(FitDegree),
-    /// Nodes of the seam are sites with the rows of their own elements only: nothing overlaps, and bonds end on the faces of elements.
-    Faces,
-    /// As [`Interface::Faces`], where families end at places on the faces.
-    Feet,
-}
+use crate::{
+    assembly::Row,
+    model::{Model, ModelError, ZoneLayout},
+};
 
 /// A method that couples both regions.
-pub trait Coupling<const D: usize>: Send + Sync {
-    /// Its usual name.
-    fn name(&self) -> &'static str;
-
-    /// Returns the symmetry of the stiffness.
-    fn symmetry(&self) -> Symmetry {
-        Symmetry::Unsymmetric
-    }
-
-    /// Returns the role of each cell, given the zones that the scene asks for.
-    fn roles(&self, mesh: &Mesh<D>, zones: &[Zone], largest_horizon: f64) -> Vec<CellRole>;
-
-    /// Returns the extent to which families have to be complete.
-    fn reach(&self, law: &dyn LinearForceState<D>) -> Reach {
-        if law.is_pairwise() {
-            Reach::Own
-        } else {
-            Reach::Neighbours
-        }
-    }
-
-    /// Returns the depth, in families from the elements, within which every process needs the families of all points; elsewhere it may hold those of its own alone. None if that is not known.
-    ///
-    /// Rows of sites beside a seam take the families of several, and every process works out and proves all of a seam.
-    fn families_of_all(&self, _law: &dyn LinearForceState<D>) -> Option<usize> {
-        None
-    }
-
-    /// Returns true if processes may also hold families so in motion: which rows are those of the body alone, and where these end, does not depend on families that lie elsewhere.
-    fn moves_with_own_families(&self) -> bool {
-        false
-    }
-
-    /// Returns true if its rows hold the products of dilatations and deviatoric extensions of a law with [`LinearForceState::has_deviators`]; any other coupling is refused for such a law.
-    fn takes_deviators(&self) -> bool {
-        false
-    }
-
-    /// The treatment of nodes at the seam.
-    fn interface(&self) -> Interface {
-        Interface::Overlap
-    }
-
+pub trait Coupling<const D: usize>: ZoneLayout<D> {
     /// Prepares what the rows need.
     ///
     /// # Errors

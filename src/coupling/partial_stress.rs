@@ -2,12 +2,10 @@
 
 use crate::{
     assembly::Row,
-    coupling::{
-        CellRole, Coupling, ExactStresses, MixedRows, Model, ModelError, Operator, Reach, Rows,
-        SeamBonds, Zone, held_families::depth_of_seam,
-    },
+    coupling::{Coupling, ExactStresses, MixedRows, Operator, Rows, SeamBonds},
     dimension,
     mesh::Mesh,
+    model::{CellRole, Model, ModelError, Reach, Zone, ZoneLayout, held_families::depth_of_seam},
     parallel,
     peridynamics::{Influence, LinearForceState, PdBody},
     tensor::{Tensor, Vector},
@@ -34,7 +32,7 @@ pub struct PartialStressMeshfree {
     pub influence: Influence,
 }
 
-impl<const D: usize> Coupling<D> for PartialStressMeshfree {
+impl<const D: usize> ZoneLayout<D> for PartialStressMeshfree {
     fn name(&self) -> &'static str {
         "partial stress (meshfree)"
     }
@@ -60,7 +58,9 @@ impl<const D: usize> Coupling<D> for PartialStressMeshfree {
     fn families_of_all(&self, law: &dyn LinearForceState<D>) -> Option<usize> {
         Some(depth_of_seam(law.is_pairwise()))
     }
+}
 
+impl<const D: usize> Coupling<D> for PartialStressMeshfree {
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         static ROWS: (
             Rows<PartialStressMeshfree, 1>,

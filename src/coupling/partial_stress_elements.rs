@@ -4,13 +4,11 @@ use std::sync::Arc;
 
 use crate::{
     assembly::Row,
-    coupling::{
-        CellRole, Coupling, ExactStresses, FitDegree, Interface, MixedRows, Model, ModelError,
-        Operator, Rows, SeamBonds, Zone,
-    },
+    coupling::{Coupling, ExactStresses, MixedRows, Operator, Rows, SeamBonds},
     dimension,
     fem::{self, QuadraturePoint},
     mesh::Mesh,
+    model::{CellRole, FitDegree, Interface, Model, ModelError, Zone, ZoneLayout},
     parallel,
     peridynamics::{
         Bound, Cloud, Ends, Factors, Families, Family, LinearForceState, MomentConditions, PdBody,
@@ -35,7 +33,7 @@ pub struct PartialStressElements {
     pub fit: FitDegree,
 }
 
-impl<const D: usize> Coupling<D> for PartialStressElements {
+impl<const D: usize> ZoneLayout<D> for PartialStressElements {
     fn name(&self) -> &'static str {
         "partial stress (elements)"
     }
@@ -58,7 +56,9 @@ impl<const D: usize> Coupling<D> for PartialStressElements {
     fn takes_deviators(&self) -> bool {
         true
     }
+}
 
+impl<const D: usize> Coupling<D> for PartialStressElements {
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         static ROWS: (
             Rows<PartialStressElements, 1>,

@@ -2,8 +2,9 @@
 
 use crate::{
     assembly::{self, Row},
-    coupling::{CellRole, Model, Operator},
+    coupling::Operator,
     fem,
+    model::{CellRole, Model},
     progress::Progress,
     system::BlockCsr,
     tensor::Tensor,

@@ -19,8 +19,9 @@ use std::sync::{Arc, PoisonError};
 
 use self::{body::MovingBody, elements::LocalElements, energy::ElementEnergy, rows::SiteRows};
 use crate::{
-    coupling::{ExactStresses, Model, NonlinearSeam, Operator},
+    coupling::{ExactStresses, NonlinearSeam, Operator},
     material::LocalLaw,
+    model::Model,
     peridynamics::bond_force::{BondKinematics, BondPass, HeatedBonds},
     system::{
         BlockCsr, BodyState, Dissipation, ElementTangent, FailureUpdate, Halfway, Interval, Ranks,

@@ -1,11 +1,9 @@
 //! Splice: each site takes the equation of its own model, and sees across the seam the continuation of that model.
 
 use crate::{
-    coupling::{
-        CellRole, Coupling, Model, ModelError, Operator, Zone, held_families::depth_of_seam,
-        uncoupled::own_model,
-    },
+    coupling::{Coupling, Operator, uncoupled::own_model},
     mesh::Mesh,
+    model::{CellRole, Model, ModelError, Zone, ZoneLayout, held_families::depth_of_seam},
     peridynamics::LinearForceState,
 };
 
@@ -17,7 +15,7 @@ use crate::{
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Splice;
 
-impl<const D: usize> Coupling<D> for Splice {
+impl<const D: usize> ZoneLayout<D> for Splice {
     fn name(&self) -> &'static str {
         "splice"
     }
@@ -43,7 +41,9 @@ impl<const D: usize> Coupling<D> for Splice {
     fn moves_with_own_families(&self) -> bool {
         true
     }
+}
 
+impl<const D: usize> Coupling<D> for Splice {
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         Ok(own_model(model))
     }

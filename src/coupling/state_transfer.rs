@@ -13,7 +13,7 @@
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::{FitDegree, Model, SiteKind, bins::Bins, least_squares_gradient};
+use crate::model::{FitDegree, Model, SiteKind, bins::Bins, least_squares_gradient};
 use crate::{assembly::Transfer, fem::Locator, parallel, tensor::Vector};
 
 #[cfg(test)]

@@ -2,9 +2,6 @@
 
 use super::*;
 use crate::coupling::semidiscrete::behaviour::BondBehaviour;
-use crate::coupling::{
-    CoupledSystem, Coupling, Peridynamics, PointSource, Problem, Splice, Surfaces, Truncated, Zone,
-};
 use crate::mesh::Mesh;
 use crate::mesh::generate::{Axis, rectangle};
 use crate::peridynamics::bond_force::BondKinematics;
@@ -14,6 +11,10 @@ use crate::solve::explicit::{Explicit, ExplicitParams, State, Undriven};
 use crate::solve::stable_step::stable_step;
 use crate::system::{SemiDiscrete, Symmetry};
 use crate::tensor::Tensor4;
+use crate::{
+    coupling::{CoupledSystem, Coupling, Problem, Splice, Truncated},
+    model::{ElasticCells, Peridynamics, PointSource, Surfaces, Zone, ZonedBody},
+};
 
 /// Size of an element; points lie four times as dense.
 const H: f64 = 1.0;
@@ -45,15 +46,17 @@ fn plate(jitter: f64) -> Mesh<2> {
 /// A plate whose cells with the centroid within are peridynamic, of glass as light as it is stiff.
 fn problem(mesh: Mesh<2>, within: [f64; 4], coupling: Box<dyn Coupling<2>>) -> Problem<2> {
     let zones = zones(&mesh, within);
-    Problem {
+    let body = ZonedBody {
         zones,
-        tensors: vec![Tensor4::isotropic(1.0, 1.0)],
-        cell_material: vec![0; mesh.cell_count()],
+        elastic: ElasticCells {
+            tensors: vec![Tensor4::isotropic(1.0, 1.0)],
+            material: vec![0; mesh.cell_count()],
+            of_points: 0,
+        },
         mesh,
-        peridynamic_material: 0,
         peridynamics: Some(Peridynamics {
             law: std::sync::Arc::new(BondBased::new(Micromodulus::InverseDistance, 1.0)),
-            horizon: crate::coupling::HorizonField::Uniform(H),
+            horizon: crate::model::HorizonField::Uniform(H),
             points: PointSource::Lattice {
                 spacing: 0.25 * H,
                 origin: Vector::<2>::repeat(0.125 * H),
@@ -64,8 +67,8 @@ fn problem(mesh: Mesh<2>, within: [f64; 4], coupling: Box<dyn Coupling<2>>) -> P
             voids: Vec::new(),
             surfaces: Surfaces::Cut,
         }),
-        coupling,
-    }
+    };
+    Problem { body, coupling }
 }
 
 fn zones(mesh: &Mesh<2>, [x0, y0, x1, y1]: [f64; 4]) -> Vec<Zone> {
@@ -94,7 +97,8 @@ fn carried(
         } else {
             Box::<Truncated>::default()
         };
-        Model::new(problem(plate(jitter), within, coupling), &Silent)
+        problem(plate(jitter), within, coupling)
+            .lay_out(None, &Silent)
             .unwrap()
             .0
     };
@@ -211,8 +215,8 @@ fn a_wave_keeps_its_energy_and_momentum_where_zones_change_under_it() {
     let mut last: Option<[f64; 3]> = None;
     let mut first = 0.0;
     for within in layouts {
-        problem.zones = zones(&problem.mesh, within);
-        let (model, coupling) = Model::new(problem, &Silent).unwrap();
+        problem.body.zones = zones(&problem.body.mesh, within);
+        let (model, coupling) = problem.lay_out(None, &Silent).unwrap();
         let operator = coupling.operator(&model).unwrap();
         let mut system = CoupledSystem::new(
             &model,
@@ -259,7 +263,10 @@ fn a_wave_keeps_its_energy_and_momentum_where_zones_change_under_it() {
         state = Some((Carried::of(&model), end));
         drop(system);
         drop(operator);
-        problem = model.into_problem(coupling);
+        problem = Problem {
+            body: model.into_body(),
+            coupling,
+        };
     }
 }
 
@@ -268,9 +275,9 @@ fn a_law_of_other_constants_than_its_elements_is_refused() {
     let with = |tensor: Tensor4<2>, weights: BondWeights| {
         let splice = Box::new(Splice);
         let mut problem = problem(plate(0.0), [4.0, 4.0, 12.0, 8.0], splice);
-        problem.tensors = vec![tensor];
-        problem.peridynamics.as_mut().unwrap().weights = weights;
-        Model::new(problem, &Silent).map(|_| ())
+        problem.body.elastic.tensors = vec![tensor];
+        problem.body.peridynamics.as_mut().unwrap().weights = weights;
+        problem.lay_out(None, &Silent).map(|_| ())
     };
     with(Tensor4::isotropic(1.0, 1.0), BondWeights::Isotropic).unwrap();
     let refused = with(Tensor4::isotropic(2.0, 1.0), BondWeights::Isotropic).unwrap_err();

@@ -2,11 +2,10 @@
 
 use crate::{
     assembly::Row,
-    coupling::{
-        CellRole, Coupling, ExactStresses, MixedRows, Model, ModelError, Operator, SeamBonds, Zone,
-    },
+    coupling::{Coupling, ExactStresses, MixedRows, Operator, SeamBonds},
     dimension,
     mesh::Mesh,
+    model::{CellRole, Model, ModelError, Zone, ZoneLayout},
     peridynamics::LinearForceState,
     system::Symmetry,
 };
@@ -19,7 +18,7 @@ pub struct Local;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Nonlocal;
 
-impl<const D: usize> Coupling<D> for Local {
+impl<const D: usize> ZoneLayout<D> for Local {
     fn name(&self) -> &'static str {
         "local"
     }
@@ -35,13 +34,15 @@ impl<const D: usize> Coupling<D> for Local {
     fn takes_deviators(&self) -> bool {
         true
     }
+}
 
+impl<const D: usize> Coupling<D> for Local {
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         Ok(own_model(model))
     }
 }
 
-impl<const D: usize> Coupling<D> for Nonlocal {
+impl<const D: usize> ZoneLayout<D> for Nonlocal {
     fn name(&self) -> &'static str {
         "nonlocal"
     }
@@ -65,7 +66,9 @@ impl<const D: usize> Coupling<D> for Nonlocal {
     fn moves_with_own_families(&self) -> bool {
         true
     }
+}
 
+impl<const D: usize> Coupling<D> for Nonlocal {
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         Ok(own_model(model))
     }

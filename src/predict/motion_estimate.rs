@@ -7,7 +7,6 @@ use super::output_cost::{TrialFolder, file_seconds, made_up};
 use super::resource_estimate::{MotionPrediction, Prediction, holds, warnings};
 use super::solver_estimate::{Planned, output_bytes};
 use crate::coupling::impact::RESOLVED;
-use crate::coupling::{Impact, Model, Operator, Sampler};
 use crate::observe::checkpoint::{CheckpointFile, Fingerprint};
 use crate::observe::series::Series;
 use crate::observe::summary::{Decision, peak_memory_bytes, resident_memory_bytes};
@@ -37,6 +36,10 @@ use crate::scene::{Output, Scene};
 use crate::solve::FreeDofs;
 use crate::solve::explicit::{Explicit, ExplicitParams};
 use crate::solve::statics::MethodUsed;
+use crate::{
+    coupling::{Impact, Operator},
+    model::{Model, Sampler},
+};
 
 /// Steps are tried for a tenth of the run to measure the duration of one, for this long at most \[s\].
 const TRIED_FOR: f64 = 0.5;

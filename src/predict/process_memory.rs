@@ -2,7 +2,7 @@
 
 use super::process_share::ProcessShare;
 use super::resource_estimate::Prediction;
-use crate::coupling::Model;
+use crate::model::Model;
 use crate::run::budget::{PER_BOND, PER_STATE_BOND};
 use crate::system::Symmetry;
 

@@ -5,7 +5,6 @@ use rustc_hash::FxHashSet;
 use super::process_memory::{Spreading, divide, per_bond};
 use super::process_share::ProcessShare;
 use super::resource_estimate::Prediction;
-use crate::coupling::{Coupling, Distribution, Model};
 use crate::observe::summary::{bytes_text, grouped};
 use crate::progress::Progress;
 use crate::run::chosen::with_choice;
@@ -17,6 +16,10 @@ use crate::scene::{Scene, Solve};
 use crate::solve::statics::Method;
 use crate::system::{Partition, Ranks, SemiDiscrete, Symmetry, share_long_rows};
 use crate::{assembly::Pattern, parallel};
+use crate::{
+    coupling::Coupling,
+    model::{Distribution, Model},
+};
 
 /// Bytes of a scalar of a sparse matrix in memory: its value and its column.
 const SCALAR: u64 = 12;

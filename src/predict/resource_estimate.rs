@@ -10,9 +10,8 @@ use super::error_prediction::ErrorPrediction;
 use super::output_cost::{made_up, output_seconds};
 use super::solver_estimate::{PROGRAM, Planned};
 use crate::assembly::Pattern;
-use crate::coupling::zone_distance::Edge;
-use crate::coupling::{Coupling, Model, Operator, PointSource, SiteKind, Zone};
 use crate::mesh::Mesh;
+use crate::model::zone_distance::Edge;
 use crate::observe::proof::{Proof, Severity};
 use crate::observe::summary::{
     Decision, Sizes, Stopwatch, Timings, bytes_text, grouped, peak_memory_bytes,
@@ -35,6 +34,10 @@ use crate::scene::spec::{CouplingTraits, ZonesNeeded};
 use crate::solve::FreeDofs;
 use crate::solve::statics::MethodUsed;
 use crate::system::Symmetry;
+use crate::{
+    coupling::{Coupling, Operator},
+    model::{Model, PointSource, SiteKind, Zone},
+};
 
 use super::process_share::ProcessShare;
 
@@ -359,7 +362,7 @@ pub(crate) fn warnings<const D: usize>(
     let mut list = Vec::new();
     // families are judged by the one spacing of a model
     let alone =
-        |p: &&crate::coupling::Peridynamics<D>| !matches!(p.points, PointSource::Lattices { .. });
+        |p: &&crate::model::Peridynamics<D>| !matches!(p.points, PointSource::Lattices { .. });
     if let (Some(body), Some(p)) = (model.body(), model.peridynamics.as_ref().filter(alone)) {
         let h = model.spacing();
         let horizons = body.cloud.horizon.values().iter();

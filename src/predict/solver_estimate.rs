@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use crate::assembly::Pattern;
-use crate::coupling::Model;
+use crate::model::Model;
 use crate::observe::summary::{Sizes, Timings};
 use crate::run::RunError;
 use crate::run::budget::Share;

@@ -1,6 +1,6 @@
 //! Balance of a body in equilibrium: its internal forces sum to zero, so that loads and reactions do.
 
-use crate::coupling::Model;
+use crate::model::Model;
 use crate::tensor::Vector;
 
 /// Forces that are none, over those that would displace the body as far by strains.

@@ -6,8 +6,8 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::coupling::{CellRole, Interface, Reach, Zone};
 use crate::mesh::Mesh;
+use crate::model::{CellRole, Interface, Reach, Zone};
 use crate::observe::report::number;
 use crate::observe::summary::{bytes_text, grouped, resident_memory_bytes};
 use crate::peridynamics::TIE_TOLERANCE;

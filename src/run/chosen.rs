@@ -1,6 +1,6 @@
 //! Fallback of a run whose chosen coupling does not hold: it goes on with the next one, and says so.
 
-use crate::coupling::ModelError;
+use crate::model::ModelError;
 use crate::run::error::RunError;
 use crate::scene::validated::Scene;
 

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use crate::coupling::Model;
+use crate::model::Model;
 use crate::observe::summary::Reaction;
 use crate::run::error::RunError;
 use crate::scene::conditions::Condition;

@@ -2,7 +2,6 @@
 //!
 //! Truncated bonds of an LPS below the Poisson ratio of a pairwise law have dilatations of negative stiffness. Whole bonds outweigh them down to a bulk modulus of zero, pieces need not: the matrix at hand decides.
 
-use crate::coupling::{Definiteness, Model, Operator};
 use crate::observe::summary::Decision;
 use crate::progress::{Progress, Silent};
 use crate::run::error::RunError;
@@ -13,6 +12,10 @@ use crate::solve::direct_params::{DirectError, DirectParams};
 use crate::solve::ordering::Ordering;
 use crate::system::{Ranks, Symmetry};
 use crate::tensor::padded;
+use crate::{
+    coupling::{Definiteness, Operator},
+    model::Model,
+};
 
 /// Shift of the matrix, as a part of its diagonal: far above what round-off leaves of the rigid motions of a free body (6e-13), and no mode that it hides grows by more than e² in 100 000 steps.
 const SHIFT: f64 = 1e-10;

@@ -8,7 +8,6 @@ use std::time::Instant;
 use super::budget;
 use super::condition_terms::ConditionTerms;
 use super::loads::{loads, supports};
-use crate::coupling::{Coupling, Distribution, Model, Operator};
 use crate::observe::summary::{Applied, Decision, Stopwatch, Timings};
 use crate::progress::Progress;
 use crate::run::error::RunError;
@@ -27,6 +26,10 @@ use crate::solve::statics::{
 };
 use crate::system::{BlockCsr, Ranks, SemiDiscrete, Spread, Symmetry, WithTerms};
 use crate::tensor::padded;
+use crate::{
+    coupling::{Coupling, Operator},
+    model::{Distribution, Model},
+};
 
 /// A model at rest under its conditions, about to be solved.
 pub(crate) struct StaticInput<'a, const D: usize> {

@@ -3,7 +3,6 @@
 use crate::coupling::semidiscrete::behaviour::SystemError;
 use std::sync::Arc;
 
-use crate::coupling::{CarryError, Model, ModelError};
 use crate::material::LocalLaw;
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointError;
@@ -13,6 +12,10 @@ use crate::solve::quasi_static::QuasiStaticError;
 use crate::solve::stable_step::StepError;
 use crate::solve::statics::StaticError;
 use crate::solve::sub_cycling::SubCyclingError;
+use crate::{
+    coupling::CarryError,
+    model::{Model, ModelError},
+};
 
 /// Error of the run of a valid scene.
 #[derive(Debug, thiserror::Error)]

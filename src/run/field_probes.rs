@@ -3,7 +3,7 @@
 use super::fields::columns::{Rows, header as columns};
 use super::fields::place::{Place, Shared};
 use super::solution::Solved;
-use crate::coupling::{Carrier, Model, Sampler};
+use crate::model::{Carrier, Model, Sampler};
 use crate::scene::validated::Output;
 use crate::tensor::Vector;
 

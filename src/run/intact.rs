@@ -3,7 +3,7 @@
 use rustc_hash::FxHashSet;
 
 use super::solution::Solved;
-use crate::coupling::SiteKind;
+use crate::model::SiteKind;
 
 /// Bonds between points that stand.
 pub(super) struct Intact(FxHashSet<(u32, u32)>);

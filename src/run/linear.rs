@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::setup::{self, problem};
 use crate::coupling::semidiscrete::masses;
-use crate::coupling::{Coupling, Model, Operator};
 use crate::material::LocalLaw;
 use crate::progress::Silent;
 use crate::run::AnyScene;
@@ -12,6 +11,10 @@ use crate::run::error::RunError;
 use crate::scene::validated::Scene;
 use crate::system::{BlockCsr, LinearMotion};
 use crate::tensor::padded;
+use crate::{
+    coupling::{Coupling, Operator},
+    model::Model,
+};
 
 /// The sites and bonds of a scene as its run lays them out: bonds intact, nothing loaded or held, nothing proved.
 pub struct SceneModel<const D: usize> {

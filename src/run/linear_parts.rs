@@ -6,7 +6,6 @@
 use serde::{Deserialize, Serialize};
 
 use crate::coupling::semidiscrete::behaviour::BondThreshold;
-use crate::coupling::{Model, Operator, SiteKind};
 use crate::observe::report::number;
 use crate::peridynamics::{Departure, largest_extension};
 use crate::run::error::RunError;
@@ -14,6 +13,10 @@ use crate::run::motion::dynamic_system::failure_criterion;
 use crate::run::setup::RunSettings;
 use crate::system::Ranks;
 use crate::tensor::{Tensor, Vector, inverse, padded, strain};
+use crate::{
+    coupling::Operator,
+    model::{Model, SiteKind},
+};
 use crate::{fem, parallel};
 
 /// Part of the stress that a law has to lose over a run before a warning names the parts that do not.

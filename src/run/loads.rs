@@ -4,18 +4,20 @@
 
 use std::collections::BTreeMap;
 
-use crate::coupling::{CellRole, Model, SiteKind};
 use crate::fem;
 use crate::mesh::Facet;
 use crate::mesh::boundary::BoundaryFacet;
+use crate::model::{CellRole, Model, SiteKind};
 use crate::observe::summary::Applied;
 use crate::run::error::RunError;
 use crate::scene::conditions::{Components, Condition, Prescribed, Support};
 use crate::scene::load::Domain;
 use crate::tensor::Vector;
 use crate::{
-    coupling::loaded_places::{may_bound_zone, split_facets},
-    coupling::tributary::{Detail, Parts},
+    model::{
+        loaded_places::{may_bound_zone, split_facets},
+        tributary::{Detail, Parts},
+    },
     parallel,
 };
 

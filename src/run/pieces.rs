@@ -2,8 +2,8 @@
 
 use super::loads::site_of_node;
 use super::point_cells::PointCells;
-use crate::coupling::{Model, SiteKind};
 use crate::mesh::CellShape;
+use crate::model::{Model, SiteKind};
 use crate::scene::spec::PointOutputSpec;
 use crate::system::{Partition, Ranks};
 use crate::tensor::{Vector, padded};

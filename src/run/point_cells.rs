@@ -6,8 +6,8 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::coupling::{CellRole, Model, PointSource};
 use crate::mesh::CellShape;
+use crate::model::{CellRole, Model, PointSource};
 use crate::tensor::{Vector, padded};
 
 /// Corners of a lattice cell in VTK's order, in halves of its edge: the first two in one dimension, four in two.

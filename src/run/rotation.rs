@@ -10,8 +10,8 @@
 //!
 //! with the volumes of the zone and of the elements and the axis `n`: `2 K μ/(K + μ) e²` of a plane with `K = λ + μ`, and the sum of its volumetric and deviatoric part in space. It is taken from the motion.
 
-use crate::coupling::{Model, SiteKind};
 use crate::fem;
+use crate::model::{Model, SiteKind};
 use crate::observe::summary::Rotation;
 use crate::run::setup::RunSettings;
 use crate::system::Ranks;

@@ -1,6 +1,6 @@
 //! Displacements of a static scene at places.
 
-use crate::coupling::Sampler;
+use crate::model::Sampler;
 use crate::progress::Progress;
 use crate::run::any_scene::AnyScene;
 use crate::run::error::RunError;

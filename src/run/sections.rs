@@ -14,7 +14,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::coupling::{Model, Sampler};
+use crate::model::{Model, Sampler};
 use crate::observe::summary::SectionForce;
 use crate::run::error::RunError;
 use crate::run::loads::holders;

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use crate::coupling::{self, Coupling, HorizonField, Model, PointSource, Problem, Surfaces};
 use crate::material::LocalLaw;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::Decision;
@@ -23,6 +22,10 @@ use crate::scene::spec::{BondsSpec, CouplingTraits, ElementsSpec, SurfacesSpec, 
 use crate::scene::validated::{Output, Scene, Solver};
 use crate::system::Ranks;
 use crate::tensor::padded;
+use crate::{
+    coupling::{Coupling, Problem},
+    model::{self, ElasticCells, HorizonField, Model, PointSource, Surfaces, ZonedBody},
+};
 
 /// A typed horizon.
 fn horizon_field<const D: usize>(horizon: Expression) -> HorizonField<D> {
@@ -187,7 +190,7 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
     let local_laws = scene.materials.iter().map(local).collect();
     let density = scene.materials.iter().map(|m| m.density).collect();
     let (voids, barriers) = (scene.voids, scene.barriers);
-    let peridynamics = scene.peridynamics.map(|p| coupling::Peridynamics {
+    let peridynamics = scene.peridynamics.map(|p| model::Peridynamics {
         law,
         horizon: horizon_field(p.horizon),
         points: match p.points {
@@ -210,12 +213,16 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
     });
     (
         Problem {
-            mesh: scene.mesh,
-            zones: scene.zones,
-            tensors,
-            cell_material: scene.cell_material,
-            peridynamic_material: material,
-            peridynamics,
+            body: ZonedBody {
+                mesh: scene.mesh,
+                zones: scene.zones,
+                elastic: ElasticCells {
+                    tensors,
+                    material: scene.cell_material,
+                    of_points: material,
+                },
+                peridynamics,
+            },
             coupling: method,
         },
         RunSettings {
@@ -262,7 +269,7 @@ pub(crate) fn shared_model<const D: usize>(
     ranks: Option<&dyn Ranks>,
     progress: &dyn Progress,
 ) -> Result<(Model<D>, Box<dyn Coupling<D>>), RunError> {
-    let (mut model, coupling) = Model::shared(problem, ranks, progress)?;
+    let (mut model, coupling) = problem.lay_out(ranks, progress)?;
     if rest.elements == ElementsSpec::CauchyBorn {
         model.follow_bonds(rest.kinematics())?;
     }

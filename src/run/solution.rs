@@ -1,9 +1,12 @@
 //! A solved scene, and where its sites lie.
 
-use crate::coupling::{Model, Operator, SiteKind, Zone};
 use crate::observe::summary::SectionForce;
 use crate::run::stress_settings::StressSettings;
 use crate::system::SemiDiscrete;
+use crate::{
+    coupling::Operator,
+    model::{Model, SiteKind, Zone},
+};
 
 /// Motion and damage of a scene in time or load steps.
 #[derive(Clone, Copy, Debug, Default)]

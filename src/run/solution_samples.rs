@@ -10,7 +10,7 @@ use crate::shape::Shape;
 use crate::system::Ranks;
 use crate::tensor::{Tensor, Vector};
 use crate::{
-    coupling::{Carrier, Sampler},
+    model::{Carrier, Sampler},
     parallel,
 };
 

@@ -14,7 +14,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::coupling::semidiscrete::CoupledSystem;
-use crate::coupling::{Coupling, Model, Operator, Problem, SiteKind};
 use crate::dimension;
 use crate::observe::ObserveError;
 use crate::observe::proof::Proof;
@@ -34,6 +33,10 @@ use crate::scene::validated::{Output, Scene};
 use crate::solve::statics::StaticInfo;
 use crate::system::{Ranks, SemiDiscrete};
 use crate::tensor::Vector;
+use crate::{
+    coupling::{Coupling, Operator, Problem},
+    model::{Model, SiteKind},
+};
 
 /// Solves a static scene and writes its outputs.
 ///

@@ -6,8 +6,9 @@ use crate::shape::Barrier;
 use crate::system::Ranks;
 use crate::tensor::{Tensor, Tensor4, Vector, inverse, strain};
 use crate::{
-    coupling::{Model, SiteKind},
-    fem, parallel,
+    fem,
+    model::{Model, SiteKind},
+    parallel,
 };
 
 use super::stresses::{principal, von_mises};

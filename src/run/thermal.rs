@@ -11,12 +11,15 @@ use std::sync::Arc;
 
 use crate::assembly::{self, Counted, Row};
 use crate::coupling::semidiscrete::FreeStretch;
-use crate::coupling::{CellRole, Model, Operator, SiteKind};
 use crate::fem;
 use crate::run::error::RunError;
 use crate::scene::temperature::Temperature;
 use crate::system::BlockCsr;
 use crate::tensor::{Tensor, Vector, padded};
+use crate::{
+    coupling::Operator,
+    model::{CellRole, Model, SiteKind},
+};
 
 /// The temperature of a body, and how its materials expand.
 #[derive(Clone, Debug)]

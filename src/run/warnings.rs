@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::coupling::{CellRole, Model, Zone};
 use crate::material::LocalLaw;
 use crate::mesh::{CellShape, quality};
+use crate::model::{CellRole, Model, Zone};
 use crate::observe::proof::{Proof, Severity};
 use crate::observe::report::number;
 use crate::run::error::RunError;

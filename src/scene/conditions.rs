@@ -7,7 +7,7 @@ use std::sync::Arc;
 pub use super::components::Components;
 use super::load::{Domain, Load};
 pub use super::places::Support;
-use crate::coupling::Model;
+use crate::model::Model;
 use crate::system::ForceTerm;
 use crate::tensor::Vector;
 

@@ -15,8 +15,8 @@ use super::spec::{
     TruncatedSpec, WeightsSpec,
 };
 use super::zones::{self, Placed};
-use crate::coupling::Zone;
 use crate::mesh::Mesh;
+use crate::model::Zone;
 use crate::scene::points::Points;
 use crate::tensor::Vector;
 

@@ -5,9 +5,9 @@ use super::places::extent;
 use super::region;
 use super::spec::{SceneSpec, ShapeSpec, VoidSpec};
 use super::value::Text;
-use crate::coupling::Zone;
 use crate::fem::Locator;
 use crate::mesh::Mesh;
+use crate::model::Zone;
 use crate::shape::{Barrier, Shape};
 use crate::tensor::Vector;
 

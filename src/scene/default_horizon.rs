@@ -6,8 +6,8 @@
 use super::default_points::{RATIO, of_cells};
 use super::expression::Expression;
 use super::spec::{PeridynamicsSpec, PointsSpec};
-use crate::coupling::Zone;
 use crate::mesh::Mesh;
+use crate::model::Zone;
 
 /// The horizon \[m\], and the reason for it if it is not typed; a lattice that is not typed suits the cells that are not local, or all if there are none.
 pub(crate) fn horizon_of<const D: usize>(

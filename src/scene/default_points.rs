@@ -8,8 +8,8 @@
 //! the ratio that most of the literature uses; a little less where that lets the smallest extent of the body hold a whole number of spacings.
 
 use super::spec::LatticeStart;
-use crate::coupling::Zone;
 use crate::mesh::Mesh;
+use crate::model::Zone;
 use crate::observe::report::number;
 use crate::scene::points::Points;
 use crate::tensor::Vector;

@@ -30,9 +30,9 @@ use super::{
     adaptive_zone, agreement, coupling_selection, cracks_and_voids, elements, failure, initial,
     lattice_regions, material_interfaces, output, solve, zones,
 };
-use crate::coupling::Zone;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
+use crate::model::Zone;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::report::{components, number};
 use crate::observe::summary::Decision;

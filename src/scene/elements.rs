@@ -5,7 +5,7 @@ use super::materials::Material;
 use super::spec::{
     BondsSpec, CouplingSpec, CutBondsSpec, ElementsSpec, SceneSpec, WeightsSpec, ZonesNeeded,
 };
-use crate::coupling::Zone;
+use crate::model::Zone;
 use crate::peridynamics::Law;
 
 /// Returns the typed law of the elements; those that follow the bonds need a coupling that carries their stress, and one lattice of bonds without memory.

@@ -7,8 +7,8 @@ use super::places::extent;
 use super::region;
 use super::spec::{BodySpec, CouplingTraits, LatticeStart, SceneSpec};
 use super::value::Text;
-use crate::coupling::{Lattice, Zone};
 use crate::mesh::Mesh;
+use crate::model::{Lattice, Zone};
 use crate::scene::points::Points;
 
 /// The cells, the spacing and the horizon of a body.

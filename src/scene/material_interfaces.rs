@@ -10,7 +10,7 @@ use super::peridynamics::Peridynamics;
 use super::source::Span;
 use super::spec::{CouplingSpec, MaterialInterfaceSpec, SceneSpec, StiffnessSpec};
 use super::value::Text;
-use crate::coupling::Zone;
+use crate::model::Zone;
 use crate::observe::summary::Decision;
 use crate::peridynamics::failure::{self, Fracture};
 use crate::peridynamics::{Law, Several, StiffnessMean};

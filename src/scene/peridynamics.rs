@@ -13,8 +13,8 @@ use super::spec::{
     WeightsSpec,
 };
 use super::value::Number;
-use crate::coupling::Zone;
 use crate::mesh::Mesh;
+use crate::model::Zone;
 use crate::peridynamics::{Influence, PartialVolume};
 use crate::tensor::{Vector, padded};
 
@@ -179,7 +179,6 @@ mod tests {
 
     use super::*;
     use crate::coupling::semidiscrete::behaviour::{BondBehaviour, BondThreshold};
-    use crate::coupling::{CoupledSystem, Sampler};
     use crate::peridynamics::bond_force::BondKinematics;
     use crate::progress::Silent;
     use crate::run::AnyScene;
@@ -187,6 +186,7 @@ mod tests {
     use crate::scene::Source;
     use crate::system::{FailureUpdate, Interval, SemiDiscrete, Symmetry};
     use crate::tensor::Tensor4;
+    use crate::{coupling::CoupledSystem, model::Sampler};
 
     /// A plate whose edge moves as `u = G x`; a lattice with δ/h = 3.3 in its middle.
     const PLATE: &str = r#"
@@ -434,7 +434,7 @@ y = 0.01
                 let mut motion =
                     CoupledSystem::new(model, operator, Symmetry::Unsymmetric, |_| 1.0, &behaviour)
                         .unwrap();
-                let wave = |s: &crate::coupling::Site<2>| {
+                let wave = |s: &crate::model::Site<2>| {
                     let x = s.position;
                     [1e-9 * (7.0 * x[0] + x[1]).sin(), 1e-9 * (9.0 * x[1]).cos()]
                 };

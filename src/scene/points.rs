@@ -1,6 +1,6 @@
 //! Positions of the points of a scene.
 
-use crate::coupling::Lattice;
+use crate::model::Lattice;
 use crate::tensor::Vector;
 
 /// Positions of the peridynamic points.

@@ -7,8 +7,8 @@ use super::places::{extent, inside};
 use super::region::{Region, position};
 use super::spec::SectionSpec;
 use super::value::Text;
-use crate::coupling::tributary::HalfSpace;
 use crate::mesh::Mesh;
+use crate::model::tributary::HalfSpace;
 use crate::tensor::Vector;
 
 /// A section through the body.

@@ -8,7 +8,7 @@ use super::peridynamics::Peridynamics;
 use super::region::Region;
 use super::spec::{SceneSpec, ZonesNeeded};
 use super::validated::Scene;
-use crate::coupling::Zone;
+use crate::model::Zone;
 use crate::observe::report::number;
 use crate::scene::points::Points;
 use crate::shape::Barrier;

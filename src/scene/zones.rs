@@ -10,7 +10,7 @@ use super::spec::{CouplingSpec, SceneSpec, ShapeSpec, SkinSpec, TransitionSpec, 
 use crate::mesh::Mesh;
 use crate::scene::selected_coupling::SelectedCoupling;
 use crate::tensor::{Vector, padded};
-use crate::{coupling::Zone, parallel};
+use crate::{model::Zone, parallel};
 
 /// The nonlocal zone that a scene needs.
 #[derive(Clone, Debug)]

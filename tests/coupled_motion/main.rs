@@ -1,9 +1,9 @@
 //! A moving model against the assembled one, closed forms and momentum.
 
-use bondline::coupling::SiteKind;
 use bondline::coupling::semidiscrete::{BondBehaviour, BondThreshold};
 use bondline::coupling::semidiscrete::{CoupledSystem, masses, scale_rows};
 use bondline::fem;
+use bondline::model::SiteKind;
 use bondline::peridynamics::bond_force::BondKinematics;
 use bondline::peridynamics::{Influence, Micromodulus};
 use bondline::system::BodyState;

@@ -6,7 +6,7 @@ use super::{
 };
 use bondline::system::BodyState;
 use bondline::{
-    coupling::SiteKind,
+    model::SiteKind,
     peridynamics::{Influence, Micromodulus, bond_force::BondKinematics},
     system::{FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry},
     tensor::Vector,

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use bondline::coupling::Model;
 use bondline::progress::Silent;
 use bondline::run::{AnyScene, setup};
 use bondline::scene::Source;
@@ -162,7 +161,7 @@ pub fn held(text: &str, ranks: usize) -> Vec<usize> {
             panic!("a scene in 2D");
         };
         let (problem, _) = setup::problem(scene.scene);
-        let (model, _) = Model::shared(problem, Some(rank), &Silent).expect("a model");
+        let (model, _) = problem.lay_out(Some(rank), &Silent).expect("a model");
         model.body().expect("points").families.neighbours.len()
     })
 }

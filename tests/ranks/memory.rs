@@ -5,8 +5,8 @@ use bondline::system::BodyState;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
+use bondline::coupling::Operator;
 use bondline::coupling::semidiscrete::{BondBehaviour, BondThreshold, CoupledSystem};
-use bondline::coupling::{Model, Operator};
 use bondline::peridynamics::bond_force::{BondKinematics, Storage};
 use bondline::progress::Silent;
 use bondline::run::{AnyScene, setup};
@@ -116,7 +116,7 @@ fn lay_out<T>(
         panic!("a scene in 3D");
     };
     let (problem, _) = setup::problem(scene.scene);
-    let (model, coupling) = Model::shared(problem, ranks, &Silent).expect("a model");
+    let (model, coupling) = problem.lay_out(ranks, &Silent).expect("a model");
     let operator: Box<dyn Operator<3> + '_> = coupling.operator(&model).expect("rows");
     let system = CoupledSystem::of_processes(
         &model,

@@ -20,7 +20,8 @@ use crate::{
     tangents::momentum,
 };
 use bondline::{
-    coupling::{BlendingFunction, FitDegree},
+    coupling::BlendingFunction,
+    model::FitDegree,
     observe::report::{Columns, Table, TableRow},
     peridynamics::Micromodulus,
     progress::Progress,

@@ -9,7 +9,7 @@
 use std::{fmt, path::Path};
 
 use crate::Effort;
-use bondline::coupling::{SiteKind, Zone};
+use bondline::model::{SiteKind, Zone};
 use bondline::observe::ObserveError;
 use bondline::observe::report::{Columns, Table, TableRow};
 use bondline::observe::summary::RunSummary;

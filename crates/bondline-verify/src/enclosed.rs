@@ -8,11 +8,12 @@ use crate::{
     typed,
 };
 use bondline::{
-    coupling::{Coupling, Model},
+    coupling::Coupling,
     mesh::{
         MeshError,
         generate::{Axis, Grid},
     },
+    model::Model,
     run::SceneModel,
     system::{BlockCsr, Partition, Ranks, Spread},
     tensor::{Tensor4, Vector},

@@ -5,9 +5,10 @@ use rayon::prelude::*;
 use crate::{Effort, meshes::scene};
 use bondline::{
     coupling::{
-        CoupledSystem, SiteKind,
+        CoupledSystem,
         semidiscrete::{BondBehaviour, SystemError},
     },
+    model::SiteKind,
     observe::report::{Columns, Table, TableRow},
     peridynamics::{
         PdBody,

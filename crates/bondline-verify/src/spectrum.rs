@@ -8,7 +8,6 @@ use rayon::prelude::*;
 use crate::Effort;
 use crate::enclosed::{INFLUENCE, Law, Method};
 use crate::strip::{Kind, Strip, StripCase};
-use bondline::coupling::{BlendingFunction, FitDegree};
 use bondline::observe::report::{Columns, Table, TableRow, Verdict};
 use bondline::peridynamics::influence::{Alpha, Degree};
 use bondline::peridynamics::{Influence, Micromodulus};
@@ -16,6 +15,7 @@ use bondline::progress::Progress;
 use bondline::solve::instability_growth::{self, LARGEST_GAIN};
 use bondline::solve::instability_growth::{REMEDY, REMEDY_SEAM};
 use bondline::solve::stable_step;
+use bondline::{coupling::BlendingFunction, model::FitDegree};
 
 /// Growth exponent per crossing of the strip that is round-off: eigenvalues that are zero or nearly double come out to half of the digits.
 pub const ROUND_OFF: f64 = 1e-4;

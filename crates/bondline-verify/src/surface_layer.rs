@@ -7,7 +7,7 @@ use crate::{
     typed,
 };
 use bondline::{
-    coupling::{Model, SiteKind},
+    model::{Model, SiteKind},
     observe::report::{Columns, Table, TableRow},
     peridynamics::Micromodulus,
     progress::{Progress, Silent},

@@ -5,7 +5,8 @@
 use std::sync::Arc;
 
 use bondline::{
-    coupling::{BlendingFunction, FitDegree},
+    coupling::BlendingFunction,
+    model::FitDegree,
     peridynamics::{
         BondBased, CalibrationFields, Correspondence, Influence, LinearPeridynamicSolid,
         Micromodulus, PositionAwareSolid,

@@ -1,7 +1,7 @@
 //! Sizes of sites, and how far their points lie below the surface.
 
-use crate::coupling::{Bins, Model, PointSource};
 use crate::mesh::facet_corners;
+use crate::model::{Bins, Model, PointSource};
 use crate::shape::{Shape, distance_to_segment};
 use crate::tensor::Vector;
 

@@ -5,7 +5,8 @@
 use std::sync::Arc;
 
 use crate::{
-    coupling::{BrokenBonds, Model},
+    coupling::BrokenBonds,
+    model::Model,
     peridynamics::{
         bond_force::{BondKinematics, KernelError, Storage},
         contact::ContactError,

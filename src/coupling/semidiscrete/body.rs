@@ -9,7 +9,8 @@ use crate::coupling::semidiscrete::behaviour::{
 };
 use crate::{
     assembly::{Row, Transfer},
-    coupling::{Model, NonlinearSeam, Operator, SiteKind},
+    coupling::{NonlinearSeam, Operator},
+    model::{Model, SiteKind},
     parallel,
     peridynamics::{
         Accelerator, Families, Law, PdBody,
@@ -215,7 +216,7 @@ fn passed_families<const D: usize>(
     (0..model.sites.len()).any(has_bonds).then(|| {
         let mut passed = body.families.clone();
         passed.retain_of(|i| !own_row[i], |i, j| mixed.is_body_bond(i, j as usize));
-        passed.mirrored(&model.feet)
+        passed.mirrored(&model.points.feet)
     })
 }
 
@@ -297,7 +298,7 @@ impl<const D: usize> MovingBody<D> {
         } = PointSites::of(model, operator, points, seam.is_some());
         let is_site: Vec<bool> = site_of_point.iter().map(|&s| s != NONE).collect();
         let mut has_force = is_site.clone();
-        for &foot in &model.feet {
+        for &foot in &model.points.feet {
             has_force[foot as usize] = true;
         }
         let no_fail: Vec<bool> = parallel::map(points, 1, |i| {
@@ -350,7 +351,7 @@ impl<const D: usize> MovingBody<D> {
             shift,
             transfer: is_asked.then(|| body.cloud.transfer.clone()),
             bonds_of_site,
-            feet: model.feet.clone(),
+            feet: model.points.feet.clone(),
             passed,
             alone: own_row.iter().filter(|own| **own).count(),
             edge,

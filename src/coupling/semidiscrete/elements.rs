@@ -5,9 +5,9 @@ use std::sync::{Arc, OnceLock};
 use super::behaviour::{CHUNK, FreeStretch};
 use super::tangent_pattern::TangentPattern;
 use crate::{
-    coupling::{CellRole, Model, SiteKind},
     fem::{CellBandError, NonlinearElements},
     material::LocalLaw,
+    model::{CellRole, Model, SiteKind},
     parallel,
     system::{ElementTangent, Interval, PlaceStress, Symmetry},
     tensor::Vector,

@@ -4,7 +4,7 @@ use super::rows::{SiteRows, row_product};
 use crate::coupling::semidiscrete::behaviour::CHUNK;
 use crate::{
     assembly::{self, Transfer},
-    coupling::{CellRole, Model, SiteKind},
+    model::{CellRole, Model, SiteKind},
     parallel,
     system::BlockCsr,
     tensor::Vector,

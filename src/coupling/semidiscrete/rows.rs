@@ -3,7 +3,7 @@
 use crate::coupling::semidiscrete::behaviour::{CHUNK, NONE};
 use crate::{
     assembly::{self, Row},
-    coupling::Model,
+    model::Model,
     parallel,
     system::{BlockCsr, ROW_CHUNK},
     tensor::{Tensor, Vector},

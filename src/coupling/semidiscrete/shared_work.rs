@@ -7,7 +7,7 @@
 use super::behaviour::NONE;
 use super::split::Split;
 use super::{CoupledSystem, scale_rows};
-use crate::coupling::Distribution;
+use crate::model::Distribution;
 use crate::system::{FailureUpdate, Interval, Ranks, Spread};
 
 impl<'a, const D: usize> CoupledSystem<'a, D> {

@@ -2,8 +2,8 @@
 
 use crate::{
     assembly::Transfer,
-    coupling::{Model, SiteKind},
     fem::NonlinearElements,
+    model::{Model, SiteKind},
     system::BlockCsr,
     tensor::Tensor,
 };

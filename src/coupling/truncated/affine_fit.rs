@@ -16,8 +16,9 @@ use super::dilatation::state_of;
 use super::squares::fit_factors;
 use crate::coupling::truncated::conditions::Conditions;
 use crate::{
-    coupling::{ModelError, SiteKind},
-    fem, parallel,
+    fem,
+    model::{ModelError, SiteKind},
+    parallel,
     peridynamics::StatePart,
     tensor::{Tensor4, Vector},
 };

@@ -5,7 +5,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use super::seam::{Course, Foot, Piece, Seam};
 use crate::{
     assembly::{Row, Transfer},
-    coupling::{Model, SiteKind, multi_lattice::ContinuedLattice},
+    model::{Model, SiteKind, continued_lattice::ContinuedLattice},
     parallel,
     peridynamics::{Mixture, PdBody},
     tensor::{Tensor, Vector},

@@ -26,8 +26,8 @@ use super::{
 };
 use crate::{
     assembly::Row,
-    coupling::bond_cutting::WholeFamily,
     mesh::Mesh,
+    model::bond_cutting::WholeFamily,
     tensor::{Tensor, Vector},
 };
 

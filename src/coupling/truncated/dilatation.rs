@@ -13,8 +13,8 @@ use std::collections::BTreeMap;
 use super::bond_segments::{BySite, End, Segment, Segments};
 use crate::{
     assembly::Row,
-    coupling::ModelError,
     fem,
+    model::ModelError,
     peridynamics::StatePart,
     tensor::{Tensor, Vector},
 };

@@ -78,7 +78,7 @@ impl<const D: usize> States<D> {
             of_part: Vec::new(),
             parts_of: vec![0; parts + 1],
             of_site: BySite::default(),
-            elements: (segments.model.dilatation.as_ref())
+            elements: (segments.model.cauchy_born.dilatation.as_ref())
                 .map(|law| (ElementDilatations::new(Arc::clone(law)), Vec::new())),
         };
         for (carrier, of) in shares {

@@ -4,7 +4,7 @@ use faer::sparse::{SparseColMat, Triplet};
 
 use super::normal::Dense;
 use crate::coupling::truncated::conditions::{Conditions, norm};
-use crate::{coupling::sparse_factors::SparseFactors, parallel};
+use crate::{model::sparse_factors::SparseFactors, parallel};
 
 /// Conditions from which on their normal equations are factorised: conjugate gradients alone take as many iterations as a long seam has points.
 const FACTORISED: usize = 300;

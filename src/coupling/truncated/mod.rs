@@ -53,12 +53,13 @@ use self::{
 };
 use crate::{
     assembly::Row,
-    coupling::{
-        CellRole, Coupling, Definiteness, ExactStresses, Interface, MixedRows, Model, ModelError,
-        Operator, Reach, Rows, SeamBonds, Zone, held_families::depth_of_seam,
-    },
+    coupling::{Coupling, Definiteness, ExactStresses, MixedRows, Operator, Rows, SeamBonds},
     dimension,
     mesh::Mesh,
+    model::{
+        CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout,
+        held_families::depth_of_seam,
+    },
     peridynamics::LinearForceState,
     system::Symmetry,
 };
@@ -82,7 +83,7 @@ pub enum CutBonds {
     Linear,
 }
 
-impl<const D: usize> Coupling<D> for Truncated {
+impl<const D: usize> ZoneLayout<D> for Truncated {
     fn name(&self) -> &'static str {
         "truncated"
     }
@@ -120,7 +121,9 @@ impl<const D: usize> Coupling<D> for Truncated {
     fn moves_with_own_families(&self) -> bool {
         true
     }
+}
 
+impl<const D: usize> Coupling<D> for Truncated {
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         static ROWS: (Rows<Truncated, 1>, Rows<Truncated, 2>, Rows<Truncated, 3>) =
             (Truncated::rows, Truncated::rows, Truncated::rows);

@@ -24,7 +24,7 @@ use super::{
 };
 use crate::{
     assembly::{Row, Transfer},
-    coupling::Model,
+    model::Model,
     parallel,
     peridynamics::{
         Families, PdBody,

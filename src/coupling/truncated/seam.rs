@@ -3,8 +3,8 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::{
-    coupling::{Model, bins::bin_of},
     fem::{self, Locator},
+    model::{Model, bins::bin_of},
     tensor::Vector,
 };
 

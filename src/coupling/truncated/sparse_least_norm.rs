@@ -1,7 +1,7 @@
 //! The smallest change that meets many sparse linear conditions.
 
 use super::conditions::{Conditions, dot, norm};
-use crate::{coupling::sparse_factors::SparseFactors, parallel};
+use crate::{model::sparse_factors::SparseFactors, parallel};
 
 /// Steps of the dual Newton method.
 const MOST_STEPS: usize = 20;

@@ -19,7 +19,7 @@ use super::affine_fit::{
 use super::bond_segments::{End, Segments};
 use super::feet::{Shift, shifts};
 use crate::coupling::truncated::conditions::Conditions;
-use crate::{coupling::ModelError, tensor::Vector};
+use crate::{model::ModelError, tensor::Vector};
 
 /// Pieces shorter than this part of the spacing get less stiffness to begin with, or their `k/s` would make the stable step arbitrarily short. Half a spacing is the shortest piece where faces follow the lattice.
 const SHORT: f64 = 0.5;

@@ -2,21 +2,14 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `feet.rs` | places on the faces of elements at which families end, with their first weights |
-//! | `fit.rs` | the smallest change of weights that balances every uniform stress |
 //! | `rows.rs` | the coupling: rows that are gradients of the energy |
-//! | `least_squares.rs` | conjugate gradients for the least squares of that fit |
+//! | `crate::model::family_ends` | places on the faces of elements at which families end, and the weights that balance every uniform stress |
 //!
 //! The energy is that of the finite elements and of the points in the nonlocal zone, `Σ V_p W(F̄_p)`, in which a family has no points beyond the faces of the zone: it ends at *feet*, places on the faces that follow the
 //! nodes of the elements there. With `F̄_p = I + Σ_q (u_q − u_p) ⊗ b_pq`, `b_pq = ω_pq V_q K_p⁻¹ ξ_pq`, every affine field has its own gradient, and the forces on points and nodes are those of an energy, whatever the local law is: a uniform stress P leaves
 //! on a point q the force `P · Σ_p V_p b_pq`. These sums vanish between whole families; at the seam, weights are so changed that they do there too, and that feet give the nodes of a face the traction `∫ N n dA` that its elements lack.
 //! Such conditions are those of variationally consistent integration, \[ChenHillmanRueter2013\], met here by the weights of both test and trial functions, so that the stiffness stays symmetric.
 
-mod feet;
-mod fit;
-mod least_squares;
 mod rows;
 
-pub(super) use feet::{Feet, place};
-pub(super) use fit::balance;
 pub use rows::TruncatedFamilies;

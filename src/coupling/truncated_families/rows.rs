@@ -1,14 +1,14 @@
 //! The rows of truncated families: gradients of an energy.
 
 use crate::assembly::Row;
-use crate::coupling::{
-    CellRole, Coupling, ExactStresses, Interface, MixedRows, Model, ModelError, Operator, Reach,
-    Rows, SeamBonds, Zone,
-};
 use crate::dimension;
 use crate::mesh::Mesh;
 use crate::peridynamics::LinearForceState;
 use crate::system::Symmetry;
+use crate::{
+    coupling::{Coupling, ExactStresses, MixedRows, Operator, Rows, SeamBonds},
+    model::{CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout},
+};
 
 /// Families that leave the peridynamic zone end on the faces of the elements around it.
 ///
@@ -16,7 +16,7 @@ use crate::system::Symmetry;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TruncatedFamilies;
 
-impl<const D: usize> Coupling<D> for TruncatedFamilies {
+impl<const D: usize> ZoneLayout<D> for TruncatedFamilies {
     fn name(&self) -> &'static str {
         "truncated"
     }
@@ -40,7 +40,9 @@ impl<const D: usize> Coupling<D> for TruncatedFamilies {
     fn interface(&self) -> Interface {
         Interface::Feet
     }
+}
 
+impl<const D: usize> Coupling<D> for TruncatedFamilies {
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
         static ROWS: (
             Rows<TruncatedFamilies, 1>,
@@ -127,14 +129,17 @@ impl<const D: usize> MixedRows<D> for FamilyRows<'_, D> {
 impl<const D: usize> Model<D> {
     /// Returns true if a point of the cloud is a foot.
     pub(crate) fn is_foot(&self, point: u32) -> bool {
-        self.feet.first().is_some_and(|first| point >= *first)
+        self.points
+            .feet
+            .first()
+            .is_some_and(|first| point >= *first)
     }
 
     /// The feet that follow each site, with their weights; empty lists without any.
     pub(super) fn feet_of_sites(&self) -> Vec<Vec<(u32, f64)>> {
         let mut of_sites = vec![Vec::new(); self.sites.len()];
         if let Some(body) = self.body() {
-            for &foot in &self.feet {
+            for &foot in &self.points.feet {
                 for (site, weight) in body.cloud.transfer.row(foot as usize) {
                     of_sites[site as usize].push((foot, weight));
                 }

@@ -3,7 +3,7 @@
 //! | file | criterion | source |
 //! |---|---|---|
 //! | `critical_stretch.rs` | stretch of the bond | \[Silling2005\] |
-//! | `fracture_energy.rs` | stretch at which a plane takes the fracture energy | [`super::critical_stretch`] |
+//! | `fracture_energy.rs` | stretch at which a plane takes the fracture energy | [`mod@super::critical_stretch`] |
 //! | `tearing_parameter.rs` | plastic flow under tension | [SAND2015-7998] eq. (6.33) |
 //!
 //! A criterion that implements [`FailureCriterion`] and has its line in the list of this file is a key of materials. Those of a stretch break bonds in all passes; those of a state do in the generic pass, which takes any law.

@@ -1,7 +1,7 @@
 //! Horizon.
 
 use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
-use crate::coupling::Zone;
+use crate::model::Zone;
 use crate::run::solution::Solved;
 
 /// Horizon.

@@ -2,7 +2,7 @@
 
 use std::cell::OnceCell;
 
-use crate::coupling::{Carrier, Zone};
+use crate::model::{Carrier, Zone};
 use crate::peridynamics::PdBody;
 use crate::run::intact::Intact;
 use crate::run::solution::Solved;

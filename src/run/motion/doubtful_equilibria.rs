@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::setup::ModelSetup;
-use crate::coupling::Model;
+use crate::model::Model;
 use crate::run::balance::{Balance, furthest, round_off};
 use crate::run::condition_terms::ConditionTerms;
 use crate::run::setup::RunSettings;

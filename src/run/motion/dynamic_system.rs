@@ -6,9 +6,6 @@ use crate::coupling::semidiscrete::behaviour::{
     BondBehaviour, BondThreshold, ContactBehaviour, SystemError,
 };
 use crate::coupling::semidiscrete::{CoupledSystem, masses};
-use crate::coupling::{
-    BrokenBonds, Coupling, Definiteness, Interface, Model, Operator, Site, SiteKind,
-};
 use crate::fem::Locator;
 use crate::observe::summary::Decision;
 use crate::peridynamics::bond_force::{BondKinematics, Storage};
@@ -30,6 +27,10 @@ use crate::scene::spec::{BondsSpec, CalibrationSpec, PrecisionSpec};
 use crate::solve::explicit::State;
 use crate::system::{LinearMotion, Ranks, SemiDiscrete};
 use crate::tensor::Vector;
+use crate::{
+    coupling::{BrokenBonds, Coupling, Definiteness, Operator},
+    model::{Interface, Model, Site, SiteKind},
+};
 
 /// Dynamic system of a scene, with its memory and its properties.
 pub struct DynamicSystem<'a> {

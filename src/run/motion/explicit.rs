@@ -12,7 +12,6 @@ use super::setup::{ModelSetup, RunSetup, begun, lay_out, opened};
 use super::sharing::sharing;
 use super::step_observer::{Segment, StepObserver, Stop, Watched};
 use super::writer::Moment;
-use crate::coupling::{BrokenBonds, Model, Operator, SiteKind, Zone};
 use crate::observe::checkpoint::{CheckpointError, CheckpointFile};
 use crate::observe::cracks::CrackSummary;
 use crate::observe::proof::{Part, Proof};
@@ -30,6 +29,10 @@ use crate::scene::spec::CouplingTraits;
 use crate::scene::validated::Scene;
 use crate::solve::explicit::{Explicit, ExplicitParams, State};
 use crate::system::SemiDiscrete;
+use crate::{
+    coupling::{BrokenBonds, Operator},
+    model::{Model, SiteKind, Zone},
+};
 
 /// The sizes of a model that moves.
 pub fn sizes<const D: usize>(model: &Model<D>, operator: &dyn Operator<D>) -> Sizes {
@@ -74,7 +77,7 @@ pub(crate) fn run<const D: usize>(
     let (mut begun, mut problem, rest) = begun(scene);
     let (file, saved) = opened(&rest, options, &mut begun.choices)?;
     if let Some(saved) = &saved {
-        let cells = problem.mesh.cell_count();
+        let cells = problem.body.mesh.cell_count();
         let fits = |zone: &SavedZone| zone.nonlocal.len() == cells && zone.wanted.len() == cells;
         if saved.zone.is_some() != rest.follow.is_some()
             || saved.zone.as_ref().is_some_and(|z| !fits(z))
@@ -85,7 +88,7 @@ pub(crate) fn run<const D: usize>(
             }));
         }
         if let Some(zone) = &saved.zone {
-            problem.zones = zones_of(&zone.nonlocal);
+            problem.body.zones = zones_of(&zone.nonlocal);
         }
     }
     let mut from = From::Start(file, saved.map(Box::new));
@@ -121,7 +124,7 @@ pub(crate) fn run<const D: usize>(
         match segment {
             RunSegment::Ended(summary) => return Ok(*summary),
             RunSegment::Switch(next, between) => {
-                problem.zones = zones_of(&between.nonlocal);
+                problem.body.zones = zones_of(&between.nonlocal);
                 begun = next;
                 from = From::Switch(between);
             }

@@ -10,7 +10,7 @@
 
 use super::seen::{Rotated, Seen};
 use super::writer::{EnergyRow, Moment};
-use crate::coupling::Model;
+use crate::model::Model;
 use crate::observe::summary::{Ended, EnergyGain, Rotation};
 use crate::run::linear_parts::LinearParts;
 use crate::run::rotation::Rotations;

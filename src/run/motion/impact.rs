@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use super::dynamic_system::DynamicSystem;
-use crate::coupling::{Impact, Model, RigidImpactor};
 use crate::observe::report::number;
 use crate::observe::summary::Decision;
 use crate::run::error::RunError;
@@ -12,6 +11,10 @@ use crate::scene::impactors::Impactor;
 use crate::solve::explicit::State;
 use crate::solve::krylov::LinearMap;
 use crate::system::WithTerms;
+use crate::{
+    coupling::{Impact, RigidImpactor},
+    model::Model,
+};
 
 /// Depth inside an impactor at time zero over the size of the body, up to which a body touches it only.
 const TOUCHES: f64 = 1e-9;

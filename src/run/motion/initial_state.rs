@@ -15,7 +15,6 @@ use super::time_dependent_loads::SceneDrive;
 use super::time_step::{held, paced, repaced};
 use super::writer::Recorder;
 use crate::coupling::impact::RESOLVED;
-use crate::coupling::{BrokenBonds, Model, Operator, Sampler};
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::proof::Part;
 use crate::observe::summary::{Decision, Stopwatch, Timings, bytes_text};
@@ -28,6 +27,10 @@ use crate::run::setup::RunSettings;
 use crate::scene::solve::Explicit as Spec;
 use crate::solve::explicit::State;
 use crate::system::Dissipation;
+use crate::{
+    coupling::{BrokenBonds, Operator},
+    model::{Model, Sampler},
+};
 
 /// A run between two layouts of its zones.
 pub(crate) struct RezoneState<'a, const D: usize> {

@@ -1,7 +1,7 @@
 //! The stretch at which bonds of each material break, and those between two.
 
-use crate::coupling::Model;
 use crate::coupling::semidiscrete::behaviour::{BondThreshold, StretchOfMaterials, SystemError};
+use crate::model::Model;
 use crate::peridynamics::Mixture;
 use crate::peridynamics::critical_stretch as failure_stretch;
 use crate::peridynamics::failure::Fracture;

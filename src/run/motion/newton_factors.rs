@@ -1,6 +1,5 @@
 //! The factors, or the multigrid, that precondition Newton's method in load steps.
 
-use crate::coupling::{Model, Operator};
 use crate::observe::summary::Decision;
 use crate::progress::Progress;
 use crate::run::condition_terms::ConditionTerms;
@@ -14,6 +13,7 @@ use crate::solve::quasi_static::TangentFactors;
 use crate::solve::statics::{self, StaticParams, StaticProblem};
 use crate::system::{BlockCsr, Symmetry};
 use crate::tensor::padded;
+use crate::{coupling::Operator, model::Model};
 
 /// Relative increase of the diagonal of the stiffness, so that pieces that nothing holds have factors too: far above round-off, and too little to
 /// cost an iteration.

@@ -1,6 +1,6 @@
 //! Columns of the history for the probes.
 
-use crate::coupling::Sampler;
+use crate::model::Sampler;
 use crate::tensor::Vector;
 
 const AXES: [&str; 3] = ["x", "y", "z"];

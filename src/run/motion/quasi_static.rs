@@ -20,7 +20,6 @@ use super::spread_factors::Leads;
 use super::step_observer::FieldOutput;
 use super::time_dependent_loads::SceneDrive;
 use super::writer::{Moment, Recorder};
-use crate::coupling::{Impact, Model, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::report::number;
@@ -45,6 +44,10 @@ use crate::solve::quasi_static::{
     TangentFactors,
 };
 use crate::system::SemiDiscrete;
+use crate::{
+    coupling::Impact,
+    model::{Model, Sampler},
+};
 
 /// Runs a scene under a load that grows.
 pub(crate) fn run<const D: usize>(

@@ -1,12 +1,12 @@
 //! A change of the nonlocal zone in the middle of a motion: transfer of the state, and the energy and momentum that the change costs.
 
-use crate::coupling::{Carried, Model};
 use crate::fem;
 use crate::observe::rezoning_event::Switch;
 use crate::run::error::RunError;
 use crate::solve::explicit::{Drive, State};
 use crate::system::SemiDiscrete;
 use crate::tensor::Vector;
+use crate::{coupling::Carried, model::Model};
 
 /// Energies and momenta that a motion must keep over a change of the zone.
 #[derive(Clone, Debug)]

@@ -6,7 +6,7 @@ use super::crack_growth::CrackGrowth;
 use super::impact_record::Peak;
 use super::rezoning::{nonlocal, share};
 use super::seen::Seen;
-use crate::coupling::Model;
+use crate::model::Model;
 use crate::observe::rezoning_event::Switch;
 use crate::solve::explicit::State;
 

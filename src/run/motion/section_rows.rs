@@ -1,6 +1,6 @@
 //! Columns of the history for the sections through the body.
 
-use crate::coupling::Model;
+use crate::model::Model;
 use crate::observe::summary::SectionForce;
 use crate::run::condition_terms::ConditionTerms;
 use crate::run::error::RunError;

@@ -7,7 +7,6 @@ use super::sharing::Sharing;
 use super::{RunOptions, StartFrom};
 use std::sync::Arc;
 
-use crate::coupling::{Model, Operator, Problem};
 use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found};
 use crate::observe::proof::Proof;
 use crate::observe::summary::{Decision, Stopwatch, Timings, resident_memory_bytes};
@@ -19,6 +18,10 @@ use crate::run::setup::{self, RunSettings};
 use crate::scene::spec::CouplingTraits;
 use crate::scene::validated::Scene;
 use crate::system::{Ranks, SemiDiscrete, WithTerms};
+use crate::{
+    coupling::{Operator, Problem},
+    model::Model,
+};
 
 /// A scene with all that it computes before its first step.
 pub struct ModelSetup<'a, const D: usize> {
@@ -157,7 +160,13 @@ pub(crate) fn lay_out<const D: usize, T>(
         watch,
     })?;
     drop(operator);
-    Ok((done, model.into_problem(coupling)))
+    Ok((
+        done,
+        Problem {
+            body: model.into_body(),
+            coupling,
+        },
+    ))
 }
 
 /// Lays a scene out and hands it on; `first` has a say before anything is computed.

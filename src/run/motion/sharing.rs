@@ -23,7 +23,7 @@ pub(crate) enum Sharing {
 /// Returns the depth, in families from the elements, to which every process needs those of all points, where each may hold those of its own sites alone elsewhere; none where a scene asks for all. Outputs and parts of a step that
 /// take bonds one by one, beside strains of points along lines and in VTU files, take those of all.
 fn families_of_all<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) -> Option<usize> {
-    let p = problem.peridynamics.as_ref()?;
+    let p = problem.body.peridynamics.as_ref()?;
     let asks_for_own = p.accelerator().is_some()
         && p.law.several().is_none()
         && rest.follow.is_none()
@@ -43,7 +43,7 @@ pub(crate) fn may_share<const D: usize>(problem: &Problem<D>, rest: &RunSettings
 
 /// Returns true if each process of a static scene may do so, beside the families at a seam. Forces then have to be linear: of others each process has the rows of all sites.
 pub(crate) fn may_share_rows<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) -> bool {
-    let law = problem.peridynamics.as_ref().map(|p| &p.law);
+    let law = problem.body.peridynamics.as_ref().map(|p| &p.law);
     rest.kinematics() == BondKinematics::Linear
         && law.is_some_and(|law| law.is_linear())
         && rest.elements == ElementsSpec::Linear

@@ -3,7 +3,6 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::newton_factors::{CoarsenedStiffness, NewtonFactors, RAISED};
-use crate::coupling::{Distribution, Model, Operator};
 use crate::observe::summary::{Decision, Stopwatch, Timings};
 use crate::progress::Progress;
 use crate::run::condition_terms::ConditionTerms;
@@ -17,6 +16,10 @@ use crate::system::{
     BlockCsr, Partition, RankRows, RankSolver, RankSolverKind, Ranks, Spread, SpringRows, Symmetry,
 };
 use crate::tensor::padded;
+use crate::{
+    coupling::Operator,
+    model::{Distribution, Model},
+};
 
 /// Preconditioner of Newton's method: factors of this process, factors over all, multigrid, or nothing.
 pub(super) struct Leads<'a> {

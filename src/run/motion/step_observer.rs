@@ -12,7 +12,6 @@ use super::saved::{EdgeReached, SavedZone, StepChoice};
 use super::seen::Seen;
 use super::writer::{EnergyRow, Moment, Recorder};
 use super::zone_monitor::{ZoneMonitor, fastest_crack};
-use crate::coupling::{Model, Operator};
 use crate::observe::ObserveError;
 use crate::observe::summary::{Ended, Timings};
 use crate::progress::Progress;
@@ -28,6 +27,7 @@ use crate::run::surface_gradient::{Asked, steep_stresses};
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::EdgeSpec;
 use crate::solve::explicit::{Explicit, State};
+use crate::{coupling::Operator, model::Model};
 
 /// Interval between reports of progress.
 const TOLD_EVERY: Duration = Duration::from_millis(200);
@@ -69,7 +69,7 @@ pub(super) struct Segment<'a, 'r, const D: usize> {
 pub(super) struct FieldOutput<'a, const D: usize> {
     model: &'a Model<D>,
     operator: &'a dyn Operator<D>,
-    zone_of_site: Vec<crate::coupling::Zone>,
+    zone_of_site: Vec<crate::model::Zone>,
     stresses: &'a StressSettings<D>,
     probes: FieldProbes,
     /// Piece of them that this one of several processes shows.

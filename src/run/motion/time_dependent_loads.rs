@@ -6,7 +6,6 @@ use std::borrow::Cow;
 
 use super::driven_impactors::{DrivenImpactors, prescribed};
 use super::way::Way;
-use crate::coupling::{Model, Operator};
 use crate::run::error::RunError;
 use crate::run::loads::{BodyForces, Loads, displacement, holders, is_function, values_at_dofs};
 use crate::run::thermal::{ExpandingRows, Thermal};
@@ -15,6 +14,7 @@ use crate::scene::impactors::Impactor;
 use crate::solve::explicit::Drive;
 use crate::system::SemiDiscrete;
 use crate::tensor::Vector;
+use crate::{coupling::Operator, model::Model};
 
 /// The conditions of a scene on the sites of its model.
 ///

@@ -2,7 +2,7 @@
 
 use super::dynamic_system::DynamicSystem;
 use super::saved::StepChoice;
-use crate::coupling::Model;
+use crate::model::Model;
 use crate::observe::{proof::Part, report::number, summary::Decision};
 use crate::run::error::RunError;
 use crate::run::loads::holders;

@@ -13,7 +13,7 @@ use super::saved::{EdgeReached, Saved, SavedZone, StepChoice, Written};
 use super::section_rows::SectionRows;
 use super::supports::Supports;
 use super::tables::Tables;
-use crate::coupling::{Model, Sampler};
+use crate::model::{Model, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::{CheckpointFile, Pace};
 use crate::observe::csv::Entry;

@@ -6,7 +6,7 @@ use crate::scene::adaptive_zone::Follow;
 use crate::system::SemiDiscrete;
 use crate::tensor::{Tensor, Vector};
 use crate::{
-    coupling::{Model, SiteKind, Zone},
+    model::{Model, SiteKind, Zone},
     parallel,
 };
 

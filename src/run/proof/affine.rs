@@ -5,7 +5,6 @@ use super::fields::{boundary_integrals, gradients, nodal_forces, of_stress};
 use super::loads::centre;
 use super::patch::{Around, PatchField, StressError, stress_errors};
 use super::surface::{self, Boundary, FacetKind, add_tractions};
-use crate::coupling::{Model, Operator, Site, SiteKind, Zone};
 use crate::observe::proof::Part;
 use crate::progress::Progress;
 use crate::run::error::RunError;
@@ -15,6 +14,10 @@ use crate::scene::spec::PrecisionSpec;
 use crate::system::{BlockCsr, Spread};
 use crate::tensor::{Tensor, Tensor4, Vector};
 use crate::{assembly::Row, parallel};
+use crate::{
+    coupling::Operator,
+    model::{Model, Site, SiteKind, Zone},
+};
 
 /// Most rows whose kind is found out one by one; of more, a sample of the worst.
 const CLASSIFIED: usize = 20_000;

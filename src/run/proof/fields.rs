@@ -1,9 +1,9 @@
 //! Affine fields: their gradients, and the exact nodal forces of their constant stress.
 
-use crate::coupling::Model;
 use crate::fem;
 use crate::mesh::boundary::BoundaryFacet;
 use crate::mesh::{Mesh, facet_corners};
+use crate::model::Model;
 use crate::tensor::{Tensor, Tensor4, Vector};
 
 /// Gradients of all affine fields, `D²` of them: those that give an elastic body one component of stress each, as large as its largest stiffness, and the

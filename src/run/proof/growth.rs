@@ -2,7 +2,6 @@
 
 #![deny(clippy::wildcard_enum_match_arm)]
 
-use crate::coupling::{Definiteness, Model, Operator};
 use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::observe::report::number;
 use crate::progress::Progress;
@@ -18,6 +17,10 @@ use crate::solve::instability_growth::{
     Evidence, Growth, LARGEST_GAIN, REMEDY, REMEDY_SEAM, growth,
 };
 use crate::system::{Ranks, SemiDiscrete, Symmetry};
+use crate::{
+    coupling::{Definiteness, Operator},
+    model::Model,
+};
 
 /// The largest factor by which a mode that is not seen may grow over the run, if the answer is to be that none grows.
 const UNSEEN: f64 = 1.1;

@@ -5,12 +5,12 @@
 #![deny(clippy::wildcard_enum_match_arm)]
 
 use super::Subject;
-use crate::coupling::loaded_places::may_bound_zone;
-use crate::coupling::tributary::Moments;
-use crate::coupling::{CellRole, Model, Zone};
 use crate::fem;
 use crate::mesh::Facet;
 use crate::mesh::boundary::BoundaryFacet;
+use crate::model::loaded_places::may_bound_zone;
+use crate::model::tributary::Moments;
+use crate::model::{CellRole, Model, Zone};
 use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::observe::report::number;
 use crate::run::error::RunError;

@@ -23,13 +23,16 @@ mod surface;
 mod symmetry;
 
 use super::setup::RunSettings;
-use crate::coupling::{Coupling, Model, Operator};
 use crate::observe::proof::{Part, Proof, Severity};
 use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::scene::spec::UnprovenSpec;
 use crate::solve::krylov::LinearMap;
 use crate::system::{BlockCsr, Ranks, SemiDiscrete};
+use crate::{
+    coupling::{Coupling, Operator},
+    model::Model,
+};
 
 pub use self::affine::displacements as affine_displacements;
 

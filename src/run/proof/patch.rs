@@ -1,7 +1,6 @@
 //! The stress error of a row that an affine field leaves out of balance: the sites around it are released and solved for, everything else keeps the field.
 
 use super::surface::{Boundary, FacetKind, PLANE};
-use crate::coupling::{Model, Operator, SiteKind};
 use crate::fem;
 use crate::progress::Silent;
 use crate::solve::FreeDofs;
@@ -11,6 +10,10 @@ use crate::solve::ordering::Ordering;
 use crate::system::{BlockCsr, Spread, Symmetry};
 use crate::tensor::{Tensor, Vector, padded};
 use crate::{assembly::Row, parallel};
+use crate::{
+    coupling::Operator,
+    model::{Model, SiteKind},
+};
 
 /// Most sites of a patch: in the plane some four horizons around its middle at m = 3, in space one and a half. With 300 in the plane the patch of a splice on scattered points came near to a singular one.
 const SITES: [usize; 3] = [200, 500, 250];

@@ -5,7 +5,7 @@
 //! in which the strain changes by `L ∇∇u`, the error of the strain is `ε δ/L` or `ℓ/L` of that change. It is of first order in δ, where classical elasticity beside a right seam is met with second order.
 
 use super::Subject;
-use crate::coupling::{CellRole, PointSource, SiteKind};
+use crate::model::{CellRole, PointSource, SiteKind};
 use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::peridynamics::PdBody;
 use crate::run::error::RunError;
@@ -348,7 +348,7 @@ fn stress_error<const D: usize>(subject: &Subject<'_, D>, tensor: &Tensor4<D>) -
     let centre = model.mesh.centroid(cells[0]);
     let fields: Vec<Vec<f64>> = pairs::<D>()
         .map(|(b, d)| {
-            let at = |site: &crate::coupling::Site<D>| monomial(&(site.position - centre), b, d);
+            let at = |site: &crate::model::Site<D>| monomial(&(site.position - centre), b, d);
             model.sites.iter().map(at).collect()
         })
         .collect();

@@ -5,10 +5,10 @@
 use rustc_hash::FxHashMap;
 
 use super::classes::Skin;
-use crate::coupling::tributary::{Detail, Parts};
-use crate::coupling::{Model, bin_of};
 use crate::mesh::boundary::BoundaryFacet;
 use crate::mesh::facet_corners;
+use crate::model::tributary::{Detail, Parts};
+use crate::model::{Model, bin_of};
 use crate::scene::conditions::{Condition, Prescribed, Support};
 use crate::shape::{Barrier, Barriers};
 use crate::tensor::{Tensor, Vector};

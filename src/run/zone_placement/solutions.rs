@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use crate::coupling::{Coupling, Local, Model, Problem, Sampler, SiteKind, Zone};
 use crate::observe::summary::{Stopwatch, Timings};
 use crate::progress::Silent;
 use crate::run::equilibrium::{self, Equilibrium};
@@ -17,6 +16,10 @@ use crate::scene::solve::Solve;
 use crate::scene::source::Span;
 use crate::scene::validated::{Scene, Solver};
 use crate::tensor::{Tensor4, Vector};
+use crate::{
+    coupling::{Coupling, Local, Problem},
+    model::{ElasticCells, Model, Sampler, SiteKind, Zone, ZonedBody},
+};
 
 /// Stiffness of cells that a crack or a void passes through, over that of their material: a crack opens as if it were a slot one to two cells wide.
 const CUT: f64 = 1e-6;
@@ -136,17 +139,21 @@ fn elements<const D: usize>(
     let soft = whole.iter().map(|c| c.scaled(CUT));
     let shift = whole.len() as u16;
     let problem = Problem {
-        mesh: scene.mesh.clone(),
-        zones: vec![Zone::Local; scene.mesh.cell_count()],
-        tensors: whole.iter().cloned().chain(soft).collect(),
-        cell_material: scene
-            .cell_material
-            .iter()
-            .zip(cut)
-            .map(|(m, cut)| if *cut { m + shift } else { *m })
-            .collect(),
-        peridynamic_material: 0,
-        peridynamics: None,
+        body: ZonedBody {
+            zones: vec![Zone::Local; scene.mesh.cell_count()],
+            elastic: ElasticCells {
+                tensors: whole.iter().cloned().chain(soft).collect(),
+                material: scene
+                    .cell_material
+                    .iter()
+                    .zip(cut)
+                    .map(|(m, cut)| if *cut { m + shift } else { *m })
+                    .collect(),
+                of_points: 0,
+            },
+            mesh: scene.mesh.clone(),
+            peridynamics: None,
+        },
         coupling: Box::new(Local),
     };
     solved(problem, &scene.conditions, &scene.solver, t)
@@ -172,12 +179,16 @@ pub(crate) fn difference_from_elements<const D: usize>(
         None => rest.materials[m].stiffness(),
     };
     let problem = Problem {
-        mesh: model.mesh.clone(),
-        zones: vec![Zone::Local; cells.len()],
-        tensors: (0..rest.materials.len()).map(tensor).collect(),
-        cell_material,
-        peridynamic_material: 0,
-        peridynamics: None,
+        body: ZonedBody {
+            zones: vec![Zone::Local; cells.len()],
+            elastic: ElasticCells {
+                tensors: (0..rest.materials.len()).map(tensor).collect(),
+                material: cell_material,
+                of_points: 0,
+            },
+            mesh: model.mesh.clone(),
+            peridynamics: None,
+        },
         coupling: Box::new(Local),
     };
     let alone = solved(problem, &rest.conditions, &rest.solver, 0.0).ok()?;
@@ -209,7 +220,7 @@ fn solved<const D: usize>(
 ) -> Result<CachedSolution<D>, RunError> {
     let mut timings = Timings::default();
     let mut watch = Stopwatch::start();
-    let (model, coupling) = Model::new(problem, &Silent)?;
+    let (model, coupling) = problem.lay_out(None, &Silent)?;
     watch.lap(&mut timings, "sites and bonds");
     let operator = coupling.operator(&model)?;
     watch.lap(&mut timings, "assembly");

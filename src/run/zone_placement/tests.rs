@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use crate::coupling::semidiscrete::behaviour::{BondBehaviour, BondThreshold};
-use crate::coupling::{CoupledSystem, Model, Zone};
 use crate::peridynamics::bond_force::BondKinematics;
 use crate::progress::Silent;
 use crate::run::{AnyScene, PlacedScene, setup, solve_with};
 use crate::scene::validated::Scene;
 use crate::scene::{SceneError, SceneErrorKind, Source};
+use crate::{coupling::CoupledSystem, model::Zone};
 
 /// A plate 2 by 1 that is pulled, with cells and points of 0.05 and a horizon of 0.15.
 const PLATE: &str = r#"
@@ -281,7 +281,7 @@ fn wrong_zones_are_refused_with_the_key_and_the_remedy() {
 fn a_scene_allocates_what_it_needs() {
     // no bond and no point where all is local
     let (problem, _) = setup::problem(bar(&[]).scene);
-    let (model, coupling) = Model::new(problem, &Silent).expect("a model");
+    let (model, coupling) = problem.lay_out(None, &Silent).expect("a model");
     assert!(model.body().is_none());
     assert_eq!(model.spacing(), 0.0);
     // one component per site in one dimension
@@ -294,7 +294,7 @@ fn a_scene_allocates_what_it_needs() {
     // of a lattice that moves, bits of damage where bonds can break and none where they cannot
     let crack = "cracks.slit.segment={from=[0.8,0.5],to=[1.2,0.5]}";
     let (problem, _) = setup::problem(plate(&[crack, LENIENT]).scene);
-    let (model, coupling) = Model::new(problem, &Silent).expect("a model");
+    let (model, coupling) = problem.lay_out(None, &Silent).expect("a model");
     let operator = coupling.operator(&model).expect("rows");
     let bits = |critical_stretch: Option<f64>| {
         let behaviour = BondBehaviour {

@@ -10,12 +10,12 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::ConditionKind;
-use crate::coupling::loaded_places::split_facets;
-use crate::coupling::tributary::{Detail, Parts};
-use crate::coupling::{CellRole, Model};
 use crate::fem;
 use crate::mesh::boundary::BoundaryFacet;
 use crate::mesh::{Facet, Mesh};
+use crate::model::loaded_places::split_facets;
+use crate::model::tributary::{Detail, Parts};
+use crate::model::{CellRole, Model};
 use crate::scene::bounds_checks;
 use crate::scene::components::Components;
 use crate::scene::conditions::{Condition, ConditionTerm, Prescribed};

@@ -8,12 +8,14 @@ use std::sync::LazyLock;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 
-use crate::coupling::{
-    Balanced, Blending, BlendingFunction, Coupling, FitDegree, Local, Nonlocal,
-    PartialStressElements, PartialStressMeshfree, Splice, Truncated, TruncatedFamilies, Zone,
-    truncated::CutBonds,
-};
 use crate::peridynamics::{Influence, LinearForceState};
+use crate::{
+    coupling::{
+        Balanced, Blending, BlendingFunction, Coupling, Local, Nonlocal, PartialStressElements,
+        PartialStressMeshfree, Splice, Truncated, TruncatedFamilies, truncated::CutBonds,
+    },
+    model::{FitDegree, Zone},
+};
 
 /// Coupling of finite elements and peridynamics.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]

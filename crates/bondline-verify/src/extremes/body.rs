@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use bondline::coupling::Sampler;
+use bondline::model::Sampler;
 use bondline::observe::summary::MotionSummary;
 use bondline::progress::Silent;
 use bondline::run::AnyScene;

@@ -5,7 +5,7 @@ use super::{
     kept, refused,
 };
 use crate::Effort;
-use bondline::coupling::Sampler;
+use bondline::model::Sampler;
 use bondline::observe::report::TableRow;
 use bondline::observe::summary::MotionSummary;
 use bondline::run::warnings;

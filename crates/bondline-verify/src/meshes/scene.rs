@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use bondline::coupling::ModelError;
+use bondline::model::ModelError;
 use bondline::observe::summary::RunSummary;
 use bondline::progress::Silent;
 use bondline::run::{AnyScene, LinearModel, RunError, Samples, SceneModel, Solved, solve_with};

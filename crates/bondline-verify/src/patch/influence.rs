@@ -8,7 +8,7 @@ use crate::{
     patch::{solution_error, widths},
 };
 use bondline::{
-    coupling::FitDegree,
+    model::FitDegree,
     observe::report::{Columns, Table, TableRow},
     peridynamics::{
         Influence, Micromodulus,

@@ -13,7 +13,6 @@ use crate::enclosed::{Case, Cells, Enclosed, Law, Method, SPACING, Widths, YOUNG
 use crate::typed;
 use bondline::coupling::semidiscrete::{BondBehaviour, BondThreshold};
 use bondline::coupling::semidiscrete::{CoupledSystem, masses, scale_rows};
-use bondline::coupling::{BlendingFunction, FitDegree};
 use bondline::observe::report::{Columns, Table, TableRow};
 use bondline::peridynamics::Micromodulus;
 use bondline::peridynamics::bond_force::BondKinematics;
@@ -21,6 +20,7 @@ use bondline::progress::{Progress, Silent};
 use bondline::solve::statics::{self, StaticParams, StaticProblem};
 use bondline::system::{BodyState, FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry};
 use bondline::tensor::{Vector, padded};
+use bondline::{coupling::BlendingFunction, model::FitDegree};
 
 const METHODS: [Method; 7] = [
     Method::Truncated,

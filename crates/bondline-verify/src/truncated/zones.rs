@@ -11,7 +11,8 @@ use crate::{
     typed,
 };
 use bondline::{
-    coupling::{ModelError, truncated::seam_conditions},
+    coupling::truncated::seam_conditions,
+    model::ModelError,
     observe::report::{Columns, Table, TableRow},
     peridynamics::Micromodulus,
     progress::Progress,

@@ -5,8 +5,8 @@
 
 use crate::{
     assembly::Transfer,
-    coupling::{Model, SiteKind},
     fem::Locator,
+    model::{Model, SiteKind},
     parallel,
     peridynamics::{PdBody, bond_force::BondKinematics},
     tensor::Vector,

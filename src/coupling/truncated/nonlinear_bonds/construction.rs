@@ -5,15 +5,13 @@ use rustc_hash::FxHashSet;
 use super::{NonlinearSeam, counted_bonds::OwnBonds};
 use crate::{
     assembly::Transfer,
-    coupling::{
-        Model, SiteKind,
-        truncated::{
-            bond_kinematics::{Part, whole_bonds},
-            bond_segments::{Segments, Springs},
-            dilatation::LpsConstants,
-            dilatation_state::States,
-        },
+    coupling::truncated::{
+        bond_kinematics::{Part, whole_bonds},
+        bond_segments::{Segments, Springs},
+        dilatation::LpsConstants,
+        dilatation_state::States,
     },
+    model::{Model, SiteKind},
     peridynamics::{PdBody, bond_force::BondKinematics},
 };
 

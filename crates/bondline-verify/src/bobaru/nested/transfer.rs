@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use bondline::{coupling::Bins, tensor::Vector};
+use bondline::{model::Bins, tensor::Vector};
 
 /// Monomials up to the third degree.
 const TERMS: usize = 10;

@@ -1,0 +1,419 @@
+//! A body with its zones and points, and the reasons why it may not make a model.
+
+use std::sync::Arc;
+
+use thiserror::Error;
+
+use crate::{
+    mesh::{CellShape, Mesh},
+    model::{Interface, Zone, ZoneLayout},
+    peridynamics::{Accelerator, BondWeights, BoxCell, Horizon, Law, PartialVolume, PointError},
+    shape::{Barrier, Shape},
+    tensor::{Tensor4, Vector},
+};
+
+/// A scalar field of position.
+pub type ScalarField<const D: usize> = Arc<dyn Fn(&Vector<D>) -> f64 + Send + Sync>;
+
+/// The horizon of a problem \[m\].
+#[derive(Clone)]
+pub enum HorizonField<const D: usize> {
+    /// One everywhere.
+    Uniform(f64),
+    /// By position.
+    Field(ScalarField<D>),
+}
+
+impl<const D: usize> HorizonField<D> {
+    /// At a position.
+    pub fn at(&self, x: &Vector<D>) -> f64 {
+        match self {
+            Self::Uniform(horizon) => *horizon,
+            Self::Field(field) => field(x),
+        }
+    }
+
+    /// Of points at some positions.
+    pub fn of_points(&self, position: &[Vector<D>]) -> Horizon {
+        match self {
+            Self::Uniform(horizon) => Horizon::Uniform(*horizon),
+            Self::Field(field) => Horizon::of_field(position.iter().map(|x| field(x)).collect()),
+        }
+    }
+}
+
+/// Source of the peridynamic points.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PointSource<const D: usize> {
+    /// One point per cell, at its centroid, with its volume.
+    Cells,
+    /// The points of a lattice that lie in the zone; the volume of each is what its cell of the lattice shares with the body.
+    Lattice {
+        /// Distance h of neighbouring points \[m\].
+        spacing: f64,
+        /// Any point of the lattice.
+        origin: Vector<D>,
+    },
+    /// Several lattices, each with its horizon, in cells that no face joins: bonds run within a lattice only.
+    Lattices {
+        /// The lattices.
+        lattices: Vec<Lattice<D>>,
+        /// The lattice of each cell, an index into `lattices`; without meaning in an element.
+        of_cell: Vec<u16>,
+    },
+}
+
+/// A lattice of points with its own horizon.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lattice<const D: usize> {
+    /// Distance h of neighbouring points \[m\].
+    pub spacing: f64,
+    /// Any point of the lattice.
+    pub origin: Vector<D>,
+    /// Horizon δ \[m\].
+    pub horizon: f64,
+}
+
+/// The peridynamic part of a problem.
+pub struct Peridynamics<const D: usize> {
+    /// The law.
+    pub law: Arc<dyn Law<D>>,
+    /// Horizon δ \[m\].
+    pub horizon: HorizonField<D>,
+    /// Source of the points; a lattice of several has its own horizon instead.
+    pub points: PointSource<D>,
+    /// Weighting of the bonds.
+    pub weights: BondWeights,
+    /// Share that counts of a cell cut by the horizon; all but [`PartialVolume::Full`] need the points of a lattice.
+    pub volumes: PartialVolume,
+    /// Voids and cracks that cut bonds.
+    pub barriers: Vec<Barrier<D>>,
+    /// Shapes whose interior holds no points although the mesh may cover it.
+    pub voids: Vec<Shape<D>>,
+    /// Treatment of bonds that leave the mesh (holes of a mesh that no barrier describes).
+    pub surfaces: Surfaces,
+}
+
+impl<const D: usize> Peridynamics<D> {
+    /// The fast pass of the law, where the weights of a bond are the same from both ends; fitted ones are not, so that every family has its own force state.
+    pub fn accelerator(&self) -> Option<Accelerator> {
+        match self.weights {
+            BondWeights::Plain | BondWeights::Isotropic => self.law.accelerator(),
+            BondWeights::Fitted => None,
+        }
+    }
+
+    /// Returns the reach of a family of that horizon \[m\]: with partial volumes it exceeds the horizon, since cells count whose points lie beyond it.
+    pub fn reach(&self, horizon: f64) -> f64 {
+        let spacing = match self.points {
+            PointSource::Lattice { spacing, .. } => spacing,
+            PointSource::Cells | PointSource::Lattices { .. } => return horizon,
+        };
+        let beyond = BoxCell::<D>::cube(Vector::zeros(), spacing)
+            .map_or(0.0, |cell| self.volumes.reach_beyond(&cell));
+        horizon + beyond
+    }
+}
+
+/// Treatment of bonds that cross the boundary of the mesh.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Surfaces {
+    /// They are cut.
+    Cut,
+    /// They are kept.
+    Uncut,
+}
+
+/// A body with its zones, before sites and families are laid out.
+pub struct ZonedBody<const D: usize> {
+    /// The mesh of the whole part.
+    pub mesh: Mesh<D>,
+    /// The zone of each cell.
+    pub zones: Vec<Zone>,
+    /// Elastic constants of the elements.
+    pub elastic: ElasticCells<D>,
+    /// The peridynamic part; none in a purely local problem.
+    pub peridynamics: Option<Peridynamics<D>>,
+}
+
+/// Elastic constants of cells.
+#[derive(Clone, Debug)]
+pub struct ElasticCells<const D: usize> {
+    /// Local elastic tensors \[Pa\], one per material.
+    pub tensors: Vec<Tensor4<D>>,
+    /// The material of each cell, an index into `tensors`.
+    pub material: Vec<u16>,
+    /// The material that peridynamic points have, an index into `tensors`.
+    pub of_points: u16,
+}
+
+/// Refuses a law whose rows a coupling cannot hold.
+pub(crate) fn takes_law<const D: usize>(
+    coupling: &dyn ZoneLayout<D>,
+    peridynamics: Option<&Peridynamics<D>>,
+) -> Result<(), ModelError> {
+    let law = peridynamics.map(|p| &p.law);
+    // what a seam of truncated bonds cuts follows the linearisation, two horizons deep
+    if coupling.interface() == Interface::Faces
+        && law.is_some_and(|law| law.linearised().has_deviators() && !law.is_linear())
+    {
+        return Err(ModelError::Unsupported {
+            what: "a position-aware solid that relaxes, with truncated bonds",
+            remedy: "use coupling.nonlocal, or the material pals",
+        });
+    }
+    match law.filter(|law| law.linearised().has_deviators() && !coupling.takes_deviators()) {
+        Some(law) => Err(ModelError::Deviators {
+            law: law.name(),
+            coupling: coupling.name(),
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Relative difference up to which two stiffness tensors are one.
+const SAME_STIFFNESS: f64 = 1e-9;
+
+/// Refuses a law that is calibrated to other constants than the elements of its material have: a uniform strain would leave forces at the seam. With plain weights elements take the tensor of the lattice.
+pub(crate) fn is_calibrated<const D: usize>(
+    peridynamics: Option<&Peridynamics<D>>,
+    tensors: &[Tensor4<D>],
+    material: u16,
+) -> Result<(), ModelError> {
+    let Some(p) = peridynamics.filter(|p| p.weights != BondWeights::Plain) else {
+        return Ok(());
+    };
+    let of_points: Vec<(u16, &dyn Law<D>)> = match p.law.several() {
+        Some(several) => (several.used().iter())
+            .map(|&material| (material, several.law(material)))
+            .collect(),
+        None => vec![(material, p.law.as_ref())],
+    };
+    for (material, law) in of_points {
+        let (of_law, of_cells) = (law.linearised().tensor(), &tensors[usize::from(material)]);
+        let mut difference = *of_law;
+        difference.add_scaled(-1.0, of_cells);
+        if difference.amax() > SAME_STIFFNESS * of_cells.amax() {
+            return Err(ModelError::OtherConstants {
+                material,
+                of_law: of_law.amax(),
+                of_cells: of_cells.amax(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Reasons why a model cannot be built.
+#[derive(Debug, Error)]
+pub enum ModelError {
+    /// A family that another process holds cannot be used; in the words of that one.
+    #[error("{message}")]
+    OfProcess {
+        /// Message of that process.
+        message: String,
+    },
+    /// A zone has no cell.
+    #[error(
+        "the {zone} zone is empty: no cell of the mesh has its centroid in it; enlarge the zone, refine the mesh there, or choose coupling.local"
+    )]
+    EmptyZone {
+        /// Which zone.
+        zone: &'static str,
+    },
+    /// A zone holds no peridynamic point.
+    #[error(
+        "the nonlocal zone holds no peridynamic point: voids cover it, or its smallest extent is below the spacing {spacing}; shrink the voids, enlarge the zone or refine the lattice"
+    )]
+    NoPoints {
+        /// Spacing of the lattice \[m\].
+        spacing: f64,
+    },
+    /// A lattice far too fine.
+    #[error(
+        "a lattice of spacing {spacing} has {points:.1e} points around the peridynamic zone, more than can be numbered; make the spacing larger or the zone smaller"
+    )]
+    TooManyPoints {
+        /// Spacing of the lattice \[m\].
+        spacing: f64,
+        /// Number of lattice points in the box around the zone.
+        points: f64,
+    },
+    /// The horizon is too small or not a number.
+    #[error("the horizon is {horizon} at ({}): it must be finite and at least the spacing of the points, {spacing}, or no point has a neighbour", join(.position))]
+    Horizon {
+        /// Position of the point.
+        position: Vec<f64>,
+        /// Its value \[m\].
+        horizon: f64,
+        /// Spacing of the points \[m\].
+        spacing: f64,
+    },
+    /// A family cannot carry the law.
+    #[error("{what} at ({}) has a family of {bonds} bonds that cannot carry the material: {source}", join(.position))]
+    Family {
+        /// Point or Gauss point.
+        what: &'static str,
+        /// Its position.
+        position: Vec<f64>,
+        /// Number of intact bonds.
+        bonds: usize,
+        /// Cause.
+        #[source]
+        source: crate::peridynamics::PdError,
+    },
+    /// A family reaches over the border of two materials.
+    #[error("bonds reach into another material at ({}): they would take its strain for that of the peridynamic one; keep the peridynamic and transition zones two horizons away from other materials, or use coupling.truncated, whose bonds end at the seam", join(.position))]
+    OtherMaterial {
+        /// Position where this happens.
+        position: Vec<f64>,
+    },
+    /// A node at the seam cannot be fitted.
+    #[error("node {node} at ({}) lies at the seam, but the {found} sites around it that no crack or void hides do not determine an affine fit: make the peridynamic zone at least three points thick there", join(.position))]
+    Fit {
+        /// Number of the node.
+        node: u32,
+        /// Position of the node.
+        position: Vec<f64>,
+        /// Number of sites found.
+        found: usize,
+    },
+    /// A cell at the seam has curved sides.
+    #[error(
+        "cell {cell} ({shape:?}) lies in the peridynamic zone or beside it, where cells of second order are made linear, but its node at ({}) is {distance:.1e} of its edge's length away from the middle of the edge; keep the zone away from curved sides, or read the mesh with order = \"linear\"", join(.position))]
+    CurvedSeam {
+        /// Number of the cell.
+        cell: usize,
+        /// Its shape.
+        shape: CellShape,
+        /// Position of the node.
+        position: Vec<f64>,
+        /// Its distance from the middle over the length of the edge.
+        distance: f64,
+    },
+    /// Derivatives cannot be taken at a point of the blending region.
+    #[error("the point at ({}) lies where the models are blended, but its {bonds} bonds do not determine a quadratic field: widen the horizon or the body there", join(.position))]
+    Derivative {
+        /// Position of the point.
+        position: Vec<f64>,
+        /// Number of intact bonds.
+        bonds: usize,
+    },
+    /// The points do not make families.
+    #[error(transparent)]
+    Families(#[from] crate::peridynamics::FamilyError),
+    /// The lattice has no partial volumes.
+    #[error(transparent)]
+    Volumes(#[from] crate::peridynamics::PartialVolumeError),
+    /// Weights of the lattice's shells cannot be made isotropic.
+    #[error(transparent)]
+    Shells(#[from] crate::peridynamics::ShellError),
+    /// No constants of the law do on this lattice what the material is to do.
+    #[error("the material `{law}`: {source}")]
+    Calibration {
+        /// The law's name.
+        law: &'static str,
+        /// Cause.
+        #[source]
+        source: crate::peridynamics::softening::CalibrationError,
+    },
+    /// Faces cut the lattice in such a way that no energies of pieces make affine fields exact.
+    #[error(
+        "the faces of the nonlocal zone cut the lattice where truncated bonds cannot be fitted to them: no {what} leave less than {residual:.1e} of the largest traction; let the faces follow the lattice (element edges a whole number of spacings long), use a horizon of three spacings or more or elements of two spacings or more at the seam, or couple by splice"
+    )]
+    Seam {
+        /// Quantity that was sought.
+        what: &'static str,
+        /// Residual, relative to the largest traction of a face.
+        residual: f64,
+    },
+    /// The conditions of a seam are more than can be met in minutes.
+    #[error(
+        "the faces of the nonlocal zone cut the lattice, and fitting truncated bonds to them takes factors of {conditions} conditions, {operations:.0e} operations or more where {most:.0e} are the limit; let the faces follow the lattice (element edges a whole number of spacings long), take a larger spacing or a smaller zone, or couple by splice"
+    )]
+    SeamTooLarge {
+        /// Conditions on the energies of bonds that the seam cuts.
+        conditions: usize,
+        /// Operations of their factorisation, a lower bound.
+        operations: f64,
+        /// The most that it may take.
+        most: f64,
+    },
+    /// A law whose dilatation and deviator have influence functions of their own, in a coupling whose rows have no place for their products.
+    #[error(
+        "the law `{law}` is not offered with the coupling `{coupling}`: its dilatation and its deviatoric extensions have influence functions of their own, and its rows have no place for the products of the two; use coupling.splice, coupling.truncated or coupling.nonlocal, or the law lps"
+    )]
+    Deviators {
+        /// The law.
+        law: &'static str,
+        /// The coupling.
+        coupling: &'static str,
+    },
+    /// A seam that would have to be fitted, of a law with two dilatations.
+    #[error(
+        "the faces of the nonlocal zone cut the lattice, and truncated bonds are fitted to such faces for one dilatation, where a position-aware solid has two; let the faces follow the lattice (element edges a whole number of spacings long, halfway between points), or use coupling.splice, coupling.balanced, coupling.blending or coupling.partial-stress, or the law lps"
+    )]
+    TwoDilatations,
+    /// A law of other constants than those of the elements of its material.
+    #[error(
+        "the peridynamic law of material {material} is calibrated to a stiffness whose largest entry is {of_law:e}, the elements of that material have {of_cells:e}, or the two differ in another entry; make the law from the tensor in `tensors`, or use plain weights, with which elements take the stiffness of the lattice"
+    )]
+    OtherConstants {
+        /// The material, an index into [`ElasticCells::tensors`].
+        material: u16,
+        /// The largest entry of the law's tensor \[Pa\].
+        of_law: f64,
+        /// That of the elements \[Pa\].
+        of_cells: f64,
+    },
+    /// A combination that is not offered.
+    #[error("{what} is not offered: {remedy}")]
+    Unsupported {
+        /// Requested combination.
+        what: &'static str,
+        /// Alternative to it.
+        remedy: &'static str,
+    },
+}
+
+impl ModelError {
+    /// Returns the position of the failure \[m\], if a single place is known.
+    pub fn position(&self) -> Option<&[f64]> {
+        match self {
+            Self::Horizon { position, .. }
+            | Self::Family { position, .. }
+            | Self::OtherMaterial { position }
+            | Self::Fit { position, .. }
+            | Self::CurvedSeam { position, .. }
+            | Self::Derivative { position, .. } => Some(position),
+            _ => None,
+        }
+    }
+}
+
+fn join(position: &[f64]) -> String {
+    position
+        .iter()
+        .map(|x| format!("{x}"))
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+impl ModelError {
+    pub(crate) fn family<const D: usize>(what: &'static str, e: PointError<D>) -> Self {
+        Self::Family {
+            what,
+            position: e.position.iter().copied().collect(),
+            bonds: e.bonds,
+            source: e.source,
+        }
+    }
+
+    /// The error of a family of a Gauss point.
+    pub fn gauss_point<const D: usize>(e: PointError<D>) -> Self {
+        Self::family("the Gauss point", e)
+    }
+}

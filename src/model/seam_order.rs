@@ -1,0 +1,94 @@
+//! Cells of second order beside peridynamic points: at the seam all cells are linear, farther away they are as the mesh has them.
+//!
+//! Forces of points on a seam are sampled on a lattice. A mid-side node of a face has two thirds of the face's load and moves alone, so that a force which is right for the whole face overloads it.
+//! Cells that hold points, carry a partial stress, or share a node with such cells are therefore made linear. The nodes in the middle of the edges that they share with cells of second order follow the ends of these edges,
+//! in displacement and, by the principle of virtual work, in force: the rows of the ends take half of the row of the node each. Nothing parts, and every affine field stays exact.
+
+use rustc_hash::FxHashMap;
+
+use crate::{
+    mesh::Mesh,
+    model::{CellRole, ModelError},
+};
+
+/// Tolerance on the distance of a mid-side node from the middle of its edge, over the edge's length, where a cell is made linear.
+const STRAIGHT: f64 = 1e-6;
+
+/// Makes linear all cells at the seam.
+///
+/// # Errors
+/// [`ModelError::CurvedSeam`] where such a cell has a side that is not straight, or not halved.
+pub(crate) fn linear_at_seam<const D: usize>(
+    mut mesh: Mesh<D>,
+    roles: &[CellRole],
+) -> Result<Mesh<D>, ModelError> {
+    if roles.iter().all(|&role| role == CellRole::Element) || !mesh.has_quadratic_cells() {
+        return Ok(mesh);
+    }
+    let mut at_seam = vec![false; mesh.nodes.len()];
+    for (c, _) in (roles.iter().enumerate()).filter(|(_, role)| **role != CellRole::Element) {
+        for &n in mesh.corners(c) {
+            at_seam[n as usize] = true;
+        }
+    }
+    let near: Vec<bool> = (0..mesh.cell_count())
+        .map(|c| mesh.corners(c).iter().any(|&n| at_seam[n as usize]))
+        .collect();
+    for c in (0..near.len()).filter(|&c| near[c]) {
+        for side in mesh.mid_sides(c) {
+            let [x, p, q] = [side.node, side.ends[0], side.ends[1]].map(|n| mesh.nodes[n as usize]);
+            let distance = (x - (p + q) * 0.5).norm() / (q - p).norm();
+            // also what is no number
+            if distance.is_nan() || distance > STRAIGHT {
+                return Err(ModelError::CurvedSeam {
+                    cell: c,
+                    shape: mesh.shapes[c],
+                    position: x.iter().copied().collect(),
+                    distance,
+                });
+            }
+        }
+    }
+    mesh.linearise(|c| near[c]);
+    Ok(mesh)
+}
+
+/// Nodes in the middle of edges that follow the ends of these.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Ties {
+    ends: FxHashMap<u32, [u32; 2]>,
+    of_end: FxHashMap<u32, Vec<u32>>,
+}
+
+impl Ties {
+    pub fn new<const D: usize>(mesh: &Mesh<D>) -> Self {
+        let mut ties = Self::default();
+        for tie in mesh.ties() {
+            ties.ends.insert(tie.node, tie.ends);
+            for end in tie.ends {
+                ties.of_end.entry(end).or_default().push(tie.node);
+            }
+        }
+        ties
+    }
+
+    /// The nodes that a node follows, half each; none if it is free.
+    pub fn ends(&self, node: u32) -> Option<[u32; 2]> {
+        self.ends.get(&node).copied()
+    }
+
+    /// The nodes that follow a node by half.
+    pub fn followers(&self, node: u32) -> &[u32] {
+        if self.of_end.is_empty() {
+            return &[];
+        }
+        self.of_end.get(&node).map_or(&[], Vec::as_slice)
+    }
+
+    /// The row of a node that follows sites, from the site of each node (`u32::MAX` for none); `None` if it is free, or an end is no site.
+    pub fn row(&self, node: u32, node_site: &[u32]) -> Option<Vec<(u32, f64)>> {
+        let sites = self.ends(node)?.map(|n| node_site[n as usize]);
+        let all_are = sites.iter().all(|&s| s != u32::MAX);
+        all_are.then(|| sites.map(|s| (s, 0.5)).to_vec())
+    }
+}
