@@ -73,12 +73,8 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Sets of files that need each other, each within one folder; their number may only fall.
-const CIRCLES: [&[&str]; 1] = [&[
-    "coupling/truncated/affine_fit",
-    "coupling/truncated/feet",
-    "coupling/truncated/squares",
-]];
+/// Sets of files that need each other.
+const CIRCLES: [&[&str]; 0] = [];
 
 /// Names that two public types of the library have, most of them what a scene says beside what is made of it; their number may only fall.
 const SHARED_NAMES: [&str; 12] = [

@@ -6,9 +6,14 @@
 use std::{borrow::Cow, collections::BTreeMap, sync::Arc};
 
 use super::{
-    bond_segments::{BySite, Segments},
-    dilatation::{Carrier, Functional, LpsConstants, carried, divergence, stiffness_of_point},
+    bond_segments::Segments,
+    dilatation::{Functional, carried, divergence},
     element_dilatation::ElementDilatations,
+};
+use crate::coupling::truncated::lps_constants::Carrier;
+use crate::coupling::truncated::{
+    lps_constants::{LpsConstants, stiffness_of_point},
+    springs::BySite,
 };
 use crate::{parallel, peridynamics::bond_force::BondKinematics, tensor::Vector};
 

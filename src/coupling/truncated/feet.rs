@@ -6,10 +6,8 @@
 
 use rustc_hash::FxHashMap;
 
-use super::{
-    affine_fit::points_at_seam,
-    bond_segments::{End, Segment, Segments},
-};
+use super::bond_segments::{End, Segment, Segments};
+use crate::coupling::truncated::fit_parts::points_at_seam;
 use crate::tensor::Vector;
 
 /// Nodes around an end, those of its trace included, beyond the D + 1 that an affine field determines.

@@ -35,10 +35,14 @@ mod dilatation_state;
 mod element_dilatation;
 mod factors;
 mod feet;
+mod fit_parts;
+mod lps_constants;
 mod nonlinear_bonds;
 mod normal;
+mod piece;
 mod seam;
 mod sparse_least_norm;
+mod springs;
 mod squares;
 
 pub(in crate::coupling) use self::nonlinear_bonds::ReachOfSeam;
@@ -46,10 +50,10 @@ pub use self::{affine_fit::SeamConditions, nonlinear_bonds::NonlinearSeam};
 
 use std::sync::Arc;
 
-use self::{
-    bond_segments::{Segments, Springs, WholeBonds},
-    corner_correction::EdgeCorrection,
-    dilatation::{Dilatations, LpsConstants},
+use self::{bond_segments::Segments, corner_correction::EdgeCorrection, dilatation::Dilatations};
+use crate::coupling::truncated::{
+    lps_constants::LpsConstants,
+    springs::{Springs, WholeBonds},
 };
 use crate::{
     assembly::Row,

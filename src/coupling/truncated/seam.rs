@@ -2,6 +2,9 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use crate::coupling::truncated::piece::{
+    Course, Piece, add, beyond_edges, crossing, for_box, normal_of,
+};
 use crate::{
     fem::{self, Locator},
     model::{Model, bins::bin_of},
@@ -22,38 +25,6 @@ const EDGE: f64 = 1e-6;
 /// Places on a bond that are this near to each other, as fractions of it, are one.
 const SAME: f64 = 1e-8;
 
-/// A piece of a bond inside of the peridynamic zone.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Piece {
-    /// Start of the piece, as a fraction of the bond.
-    pub from: f64,
-    /// End of the piece, as a fraction of the bond.
-    pub to: f64,
-    /// Share of the bond that runs there: less than 1 for a bond within a face or an edge of the zone, or through an edge.
-    pub share: f64,
-}
-
-impl Piece {
-    /// A bond from end to end.
-    pub const WHOLE: Self = Self {
-        from: 0.0,
-        to: 1.0,
-        share: 1.0,
-    };
-
-    /// Returns the piece, inside of the zone, of a bond that is not outside as a whole; of one that is cut, the first part or the last.
-    pub fn of(course: Course, is_first: bool) -> Self {
-        match (course, is_first) {
-            (Course::Cut(to), true) => Self { to, ..Self::WHOLE },
-            (Course::Cut(from), false) => Self {
-                from,
-                ..Self::WHOLE
-            },
-            _ => Self::WHOLE,
-        }
-    }
-}
-
 /// A face between the zone and an element.
 struct Face<const D: usize> {
     nodes: Vec<u32>,
@@ -70,19 +41,6 @@ impl<const D: usize> Face<D> {
     fn may_meet(&self, low: &Vector<D>, high: &Vector<D>) -> bool {
         (0..D).all(|i| low[i] <= self.high[i] && high[i] >= self.low[i])
     }
-}
-
-/// Course of a bond, as far as the faces determine it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Course {
-    /// Inside of the zone.
-    Inside,
-    /// Outside of it.
-    Outside,
-    /// Through the faces once, at this fraction of it.
-    Cut(f64),
-    /// [`Seam::pieces`] has to tell: along a face, through an edge of the zone, or more often.
-    Unclear,
 }
 
 /// Relation of a cell to a lattice.
@@ -415,173 +373,6 @@ impl<'a, const D: usize> Seam<'a, D> {
     }
 }
 
-fn add(pieces: &mut Vec<Piece>, from: f64, to: f64, share: f64) {
-    match pieces.iter_mut().find(|p| p.from == from && p.to == to) {
-        Some(piece) => piece.share += share,
-        None => pieces.push(Piece { from, to, share }),
-    }
-}
-
-/// Returns the fraction at which the bond from `a` to `b` passes a point (1D), an edge (2D) or a triangle (3D); none if it runs in its plane.
-fn crossing<const D: usize>(
-    a: &Vector<D>,
-    b: &Vector<D>,
-    corners: &[Vector<D>; D],
-    normal: &Vector<D>,
-    tolerance: f64,
-) -> Option<f64> {
-    let (p, q) = ((a - corners[0]).dot(normal), (b - corners[0]).dot(normal));
-    if (p > tolerance && q > tolerance)
-        || (p < -tolerance && q < -tolerance)
-        || (p - q).abs() <= 2.0 * tolerance
-    {
-        return None;
-    }
-    let t = (p / (p - q)).clamp(0.0, 1.0);
-    (beyond_edges(&(a + (b - a) * t), corners, normal) <= tolerance).then_some(t)
-}
-
-/// Returns the distance \[m\] by which a place in the plane of a point (1D), an edge (2D) or a triangle (3D) lies beyond its ends; negative inside of them.
-fn beyond_edges<const D: usize>(
-    x: &Vector<D>,
-    corners: &[Vector<D>; D],
-    normal: &Vector<D>,
-) -> f64 {
-    match D {
-        1 => 0.0,
-        2 => {
-            let e = corners[1] - corners[0];
-            let s = (x - corners[0]).dot(&e) / e.norm_squared();
-            (-s).max(s - 1.0) * e.norm()
-        }
-        _ => (0..D)
-            .map(|i| {
-                // distance beyond the edge, within the plane
-                let (c, d) = (corners[i], corners[(i + 1) % D]);
-                let e = d - c;
-                let v = x - c;
-                let mut across = 0.0;
-                for k in 0..3 {
-                    let (l, m) = ((k + 1) % 3, (k + 2) % 3);
-                    across += normal[k] * (e[l] * v[m] - e[m] * v[l]);
-                }
-                -across / e.norm()
-            })
-            .fold(f64::NEG_INFINITY, f64::max),
-    }
-}
-
-/// Unit normal; none of a degenerate face.
-fn normal_of<const D: usize>(x: &[Vector<D>; D]) -> Option<Vector<D>> {
-    let mut n = Vector::<D>::zeros();
-    match D {
-        1 => n[0] = 1.0,
-        2 => {
-            let e = x[1] - x[0];
-            (n[0], n[1]) = (e[1], -e[0]);
-        }
-        _ => {
-            let (p, q) = (x[1] - x[0], x[2] - x[0]);
-            for k in 0..3 {
-                let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-                n[k] = p[i] * q[j] - p[j] * q[i];
-            }
-        }
-    }
-    let size = n.norm();
-    (size > 0.0).then(|| n / size)
-}
-
-fn for_box<const D: usize>(first: &[i64; D], last: &[i64; D], mut visit: impl FnMut([i64; D])) {
-    let mut at = *first;
-    loop {
-        visit(at);
-        let mut axis = 0;
-        while axis < D {
-            if at[axis] < last[axis] {
-                at[axis] += 1;
-                break;
-            }
-            at[axis] = first[axis];
-            axis += 1;
-        }
-        if axis == D {
-            return;
-        }
-    }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::run::SceneModel;
-    use crate::run::block::Block;
-
-    /// Bonds of all kinds at a seam, of a lattice moved by some parts of its spacing: how they run against their pieces, which are found by looking where the middle of each part lies.
-    fn compare<const D: usize>(size: u32, has_triangles: bool) {
-        let block = Block {
-            coupling: "\"truncated\"",
-            material: ["bond-based", ""],
-            influence: "",
-            size,
-            has_triangles,
-            widths: [2 * size, 0, 4 / size * size],
-            ratio: 3,
-            origin: 0.5,
-        };
-        let SceneModel { model, .. } = block.model::<D>();
-        let model = &model;
-        let (body, passing) = (model.body().unwrap(), model.passing().unwrap());
-        let horizon = body.cloud.horizon.largest();
-        let seam = Seam::new(model, 0, horizon, horizon);
-        // points on faces last
-        for shift in [0.0, 0.137, 0.5] {
-            let by = Vector::repeat(shift * model.spacing());
-            let position: Vec<Vector<D>> = body.cloud.position.iter().map(|x| x + by).collect();
-            let is_site = |x: &Vector<D>| {
-                let distance = |f: &Face<D>| model.mesh.distance_to_facet(x, &f.nodes);
-                let touches = |f: &Face<D>| distance(f) <= ON_FACE * seam.size;
-                seam.in_zone(x) && !seam.faces.iter().any(touches)
-            };
-            let is_site: Vec<bool> = position.iter().map(is_site).collect();
-            let (mut cut, mut unclear) = (0, 0);
-            let (mut near, mut pieces) = (Vec::new(), Vec::new());
-            for i in 0..position.len() {
-                let family = match body.families.of(i) {
-                    [] => passing.families.of(i),
-                    family => family,
-                };
-                seam.faces_around(&position[i], &mut near);
-                for &j in family.iter().filter(|&&j| j as usize > i) {
-                    let (a, b) = (&position[i], &position[j as usize]);
-                    let ends = [is_site[i], is_site[j as usize]];
-                    let course = seam.course(a, b, ends, &near);
-                    if course == Course::Unclear {
-                        unclear += usize::from(seam.near(a, b));
-                        continue;
-                    }
-                    cut += usize::from(matches!(course, Course::Cut(_)));
-                    seam.pieces(a, b, &near, &mut pieces);
-                    let wanted = Piece::of(course, ends[0]);
-                    let wanted = (course != Course::Outside).then_some(wanted);
-                    assert_eq!(pieces, wanted.as_slice(), "{size}, {a} to {b}");
-                }
-            }
-            assert!(cut > 50, "{cut}");
-            // few enough for most of the work to be saved, unless points lie on faces
-            let few = cut / 5;
-            assert!(
-                shift == 0.5 || unclear < few,
-                "{size}, {shift}: {unclear} of {cut}"
-            );
-        }
-    }
-
-    #[test]
-    fn how_a_bond_runs_agrees_with_its_pieces() {
-        compare::<2>(1, false);
-        compare::<2>(3, false);
-        compare::<2>(2, true);
-        compare::<3>(1, false);
-    }
-}
+#[path = "seam_tests.rs"]
+mod tests;

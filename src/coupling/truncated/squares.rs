@@ -12,13 +12,13 @@
 
 use rustc_hash::FxHashMap;
 
-use super::affine_fit::{
-    FLOOR, MET, MOST_TRIPLES, Part, cube, finish, loaded_nodes, pair_tensor, parts, points_at_seam,
-    rounding, third, triples,
-};
 use super::bond_segments::{End, Segments};
 use super::feet::{Shift, shifts};
 use crate::coupling::truncated::conditions::Conditions;
+use crate::coupling::truncated::fit_parts::{
+    FLOOR, MET, MOST_TRIPLES, Part, cube, finish, loaded_nodes, pair_tensor, parts, points_at_seam,
+    rounding, third, triples,
+};
 use crate::{model::ModelError, tensor::Vector};
 
 /// Pieces shorter than this part of the spacing get less stiffness to begin with, or their `k/s` would make the stable step arbitrarily short. Half a spacing is the shortest piece where faces follow the lattice.

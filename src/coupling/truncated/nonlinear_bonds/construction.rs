@@ -7,9 +7,10 @@ use crate::{
     assembly::Transfer,
     coupling::truncated::{
         bond_kinematics::{Part, whole_bonds},
-        bond_segments::{Segments, Springs},
-        dilatation::LpsConstants,
+        bond_segments::Segments,
         dilatation_state::States,
+        lps_constants::LpsConstants,
+        springs::Springs,
     },
     model::{Model, SiteKind},
     peridynamics::{PdBody, bond_force::BondKinematics},
