@@ -156,8 +156,8 @@
 //!     }),
 //!     mesh,
 //! };
-//! let coupling = Splice;
-//! let model = Model::new(body, &coupling, None, &Silent)?;
+//! let coupling: &dyn Coupling<1> = &Splice;
+//! let model = Model::new(body, coupling, None, &Silent)?;
 //! let operator = coupling.operator(&model)?;
 //! let stiffness = model.assemble(operator.as_ref(), &Silent);
 //!

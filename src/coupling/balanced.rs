@@ -7,7 +7,7 @@ use crate::{
     },
     dimension,
     mesh::Mesh,
-    model::{CellRole, Model, ModelError, Zone, ZoneLayout},
+    model::{CellRole, Interface, Model, ModelError, Zone, ZoneLayout},
     peridynamics::PdBody,
 };
 
@@ -29,6 +29,10 @@ pub struct Balanced {
 impl<const D: usize> ZoneLayout<D> for Balanced {
     fn name(&self) -> &'static str {
         "balanced"
+    }
+
+    fn interface(&self) -> Interface {
+        Interface::Overlap
     }
 
     fn roles(&self, mesh: &Mesh<D>, zones: &[Zone], largest_horizon: f64) -> Vec<CellRole> {

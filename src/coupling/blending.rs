@@ -6,7 +6,7 @@ use crate::{
     dimension,
     mesh::Mesh,
     model::{
-        CellRole, Model, ModelError, Zone, ZoneLayout,
+        CellRole, Interface, Model, ModelError, Zone, ZoneLayout,
         held_families::depth_of_seam,
         least_squares_gradient::{self, DerivativeWeights},
         zone_distance::Edge,
@@ -58,6 +58,10 @@ pub struct Blending {
 impl<const D: usize> ZoneLayout<D> for Blending {
     fn name(&self) -> &'static str {
         "blending"
+    }
+
+    fn interface(&self) -> Interface {
+        Interface::Overlap
     }
 
     fn roles(&self, mesh: &Mesh<D>, zones: &[Zone], largest_horizon: f64) -> Vec<CellRole> {
@@ -240,6 +244,10 @@ impl<const D: usize> Operator<D> for Blended<'_, D> {
         if let Some(derivatives) = &self.derivatives[i] {
             self.add_remainder(i, derivatives, row);
         }
+    }
+
+    fn counts_materials(&self) -> bool {
+        false
     }
 
     fn is_body_row(&self, site: usize) -> bool {

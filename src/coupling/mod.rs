@@ -124,9 +124,7 @@ pub trait Operator<const D: usize>: Sync {
     fn is_body_row(&self, site: usize) -> bool;
 
     /// Returns true if rows count elements and bonds by their materials, [`Row::count_only`]: only then do materials expand differently at the seam.
-    fn counts_materials(&self) -> bool {
-        false
-    }
+    fn counts_materials(&self) -> bool;
 
     /// The bonds of the body that rows hold among other terms, where the operator has such rows.
     fn mixed_rows(&self) -> Option<&dyn MixedRows<D>>;

@@ -5,7 +5,10 @@ use crate::{
     coupling::{Coupling, ExactStresses, MixedRows, Operator, Rows, SeamBonds},
     dimension,
     mesh::Mesh,
-    model::{CellRole, Model, ModelError, Reach, Zone, ZoneLayout, held_families::depth_of_seam},
+    model::{
+        CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout,
+        held_families::depth_of_seam,
+    },
     parallel,
     peridynamics::{Influence, LinearForceState, PdBody},
     tensor::{Tensor, Vector},
@@ -35,6 +38,10 @@ pub struct PartialStressMeshfree {
 impl<const D: usize> ZoneLayout<D> for PartialStressMeshfree {
     fn name(&self) -> &'static str {
         "partial stress (meshfree)"
+    }
+
+    fn interface(&self) -> Interface {
+        Interface::Overlap
     }
 
     fn roles(&self, _mesh: &Mesh<D>, zones: &[Zone], _largest_horizon: f64) -> Vec<CellRole> {
@@ -124,6 +131,10 @@ impl<const D: usize> Operator<D> for Meshfree<'_, D> {
             body.add_partial_stresses(self.divergence(body, i), row);
             self.add_control(body, i, row);
         }
+    }
+
+    fn counts_materials(&self) -> bool {
+        false
     }
 
     fn is_body_row(&self, site: usize) -> bool {

@@ -219,6 +219,10 @@ impl<const D: usize> Operator<D> for Elements<'_, D> {
         self.body.add_partial_stresses(self.stresses_on(site), row);
     }
 
+    fn counts_materials(&self) -> bool {
+        false
+    }
+
     fn mixed_rows(&self) -> Option<&dyn MixedRows<D>> {
         None
     }

@@ -3,7 +3,9 @@
 use crate::{
     coupling::{Coupling, Operator, uncoupled::own_model},
     mesh::Mesh,
-    model::{CellRole, Model, ModelError, Zone, ZoneLayout, held_families::depth_of_seam},
+    model::{
+        CellRole, Interface, Model, ModelError, Zone, ZoneLayout, held_families::depth_of_seam,
+    },
     peridynamics::LinearForceState,
 };
 
@@ -18,6 +20,10 @@ pub struct Splice;
 impl<const D: usize> ZoneLayout<D> for Splice {
     fn name(&self) -> &'static str {
         "splice"
+    }
+
+    fn interface(&self) -> Interface {
+        Interface::Overlap
     }
 
     fn roles(&self, _mesh: &Mesh<D>, zones: &[Zone], _largest_horizon: f64) -> Vec<CellRole> {

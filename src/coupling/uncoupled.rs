@@ -5,7 +5,7 @@ use crate::{
     coupling::{Coupling, ExactStresses, MixedRows, Operator, SeamBonds},
     dimension,
     mesh::Mesh,
-    model::{CellRole, Model, ModelError, Zone, ZoneLayout},
+    model::{CellRole, Interface, Model, ModelError, Zone, ZoneLayout},
     peridynamics::LinearForceState,
     system::Symmetry,
 };
@@ -21,6 +21,10 @@ pub struct Nonlocal;
 impl<const D: usize> ZoneLayout<D> for Local {
     fn name(&self) -> &'static str {
         "local"
+    }
+
+    fn interface(&self) -> Interface {
+        Interface::Overlap
     }
 
     fn symmetry(&self) -> Symmetry {
@@ -45,6 +49,10 @@ impl<const D: usize> Coupling<D> for Local {
 impl<const D: usize> ZoneLayout<D> for Nonlocal {
     fn name(&self) -> &'static str {
         "nonlocal"
+    }
+
+    fn interface(&self) -> Interface {
+        Interface::Overlap
     }
 
     fn symmetry(&self) -> Symmetry {
@@ -77,7 +85,7 @@ impl<const D: usize> Coupling<D> for Nonlocal {
 type Own<const D: usize> = for<'a> fn(&'a Model<D>) -> Box<dyn Operator<D> + 'a>;
 
 /// The rows of a model of which each site takes the equation of its own model, [SAND2015-7998] eq. (2.30).
-pub(super) fn own_model<'a, const D: usize>(model: &'a Model<D>) -> Box<dyn Operator<D> + 'a> {
+pub(crate) fn own_model<'a, const D: usize>(model: &'a Model<D>) -> Box<dyn Operator<D> + 'a> {
     fn rows<'a, const D: usize>(model: &'a Model<D>) -> Box<dyn Operator<D> + 'a> {
         Box::new(OwnModel { model })
     }

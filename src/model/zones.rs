@@ -90,7 +90,5 @@ pub trait ZoneLayout<const D: usize>: Send + Sync {
     }
 
     /// The treatment of nodes at the seam.
-    fn interface(&self) -> Interface {
-        Interface::Overlap
-    }
+    fn interface(&self) -> Interface;
 }

@@ -3,7 +3,6 @@
 use super::resource_estimate::Prediction;
 use crate::observe::proof::Proof;
 use crate::observe::summary::{Decision, Sizes, Timings};
-use crate::peridynamics::Influence;
 use crate::run::budget::Counts;
 use crate::scene::Scene;
 
@@ -48,7 +47,10 @@ pub(crate) fn counted<const D: usize>(scene: &Scene<D>) -> Option<Prediction> {
             nonzeros: whole(counts.nonzeros),
         },
         method: None,
-        symmetry: scene.coupling.build::<D>(Influence::Gaussian).symmetry(),
+        symmetry: scene
+            .coupling
+            .build(scene.point_law.linearised())
+            .symmetry(),
         unknowns: whole(counts.dofs),
         factor_nonzeros: 0,
         operations: 0.0,

@@ -125,7 +125,7 @@ impl Counts {
             .find(|(zone, _)| **zone != Zone::Local)
             .map_or(0, |(_, m)| usize::from(*m));
         let law = scene.materials[material].law.linearised();
-        let coupling = scene.coupling.build_for(law);
+        let coupling = scene.coupling.build(law);
         let horizon: Vec<f64> = (0..mesh.cell_count())
             .map(|c| p.horizon_at(&mesh.centroid(c)))
             .collect();

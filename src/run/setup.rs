@@ -180,7 +180,7 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
     let least = ratios.min_by(|a, b| a.typed.total_cmp(&b.typed));
     let first = &scene.materials[usize::from(material)];
     let ratio = least.unwrap_or_else(|| Ratio::new(first.lame, scene.kinematics));
-    let method = scene.coupling.build_for(law.linearised());
+    let method = scene.coupling.build(law.linearised());
     let chosen = scene.coupling_why.map(|why| Decision {
         choice: format!("coupling {}", scene.coupling.traits().name),
         why,

@@ -11,8 +11,8 @@ use super::peridynamics;
 use super::selected_coupling::SelectedCoupling;
 use super::source::Span;
 use super::spec::{
-    CouplingSpec, ElementsSpec, NoOptionsSpec, PeridynamicsSpec, PointsSpec, SceneSpec,
-    TruncatedSpec, WeightsSpec,
+    CouplingSpec, ElementsSpec, LocalSpec, NonlocalSpec, PeridynamicsSpec, PointsSpec, SceneSpec,
+    SpliceSpec, TruncatedSpec, WeightsSpec,
 };
 use super::zones::{self, Placed};
 use crate::mesh::Mesh;
@@ -52,11 +52,11 @@ pub(crate) fn selected<const D: usize>(
     if let Some(placed) = placed {
         let only = |coupling, why: &str| of(coupling, placed.span.clone(), Some(why.to_owned()));
         if !placed.nonlocal.contains(&true) {
-            let coupling = CouplingSpec::Local(NoOptionsSpec {});
+            let coupling = CouplingSpec::Local(LocalSpec {});
             return Ok(only(coupling, "the zone that was placed is empty"));
         }
         if !placed.nonlocal.contains(&false) && spec.coupling.is_none() {
-            let coupling = CouplingSpec::Nonlocal(NoOptionsSpec {});
+            let coupling = CouplingSpec::Nonlocal(NonlocalSpec {});
             return Ok(only(coupling, "the zone that was placed holds every cell"));
         }
     }
@@ -71,7 +71,7 @@ pub(crate) fn selected<const D: usize>(
     let Some(p) = &spec.peridynamics else {
         without_peridynamics(spec)?;
         let why = "the scene has no [peridynamics]".to_owned();
-        return Ok(of(CouplingSpec::Local(NoOptionsSpec {}), span, Some(why)));
+        return Ok(of(CouplingSpec::Local(LocalSpec {}), span, Some(why)));
     };
     let truncated = of(
         CouplingSpec::Truncated(TruncatedSpec::default()),
@@ -85,7 +85,7 @@ pub(crate) fn selected<const D: usize>(
         // only bonds that end on faces join bodies of different horizons
         return Ok(truncated);
     }
-    let splice = CouplingSpec::Splice(NoOptionsSpec {});
+    let splice = CouplingSpec::Splice(SpliceSpec {});
     let is_placed = spec.zones.auto.is_some();
     Ok(
         match obstacle(spec, p, (found, cell_material), mesh, &truncated, placed)? {

@@ -11,6 +11,7 @@
 //! | `draft.rs`, `validated.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
 //! | `meshing.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `materials.rs`, `material_interfaces.rs`, `peridynamics.rs`, `default_points.rs`, `default_horizon.rs`, `points.rs`, `cracks_and_voids.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs`, `section.rs` | its parts |
 //! | `coupling_selection.rs`, `selected_coupling.rs` | the coupling that is typed, or the one that suits the scene |
+//! | `coupling_kinds/` | the couplings that are typed, one file each |
 //! | `condition_kinds/` | the conditions that are typed, one file each: loads, supports, springs |
 //! | `conditions.rs`, `load.rs`, `condition_list.rs` | a condition; a load, where it acts and its density; all conditions together |
 //! | `components.rs`, `places.rs` | vector fields, and the sets and shapes that conditions name |
@@ -33,6 +34,7 @@ pub(crate) mod components;
 pub mod condition_kinds;
 mod condition_list;
 pub(crate) mod conditions;
+pub mod coupling_kinds;
 pub(crate) mod coupling_selection;
 pub(crate) mod cracks_and_voids;
 mod default_horizon;

@@ -259,6 +259,10 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
         self.pieces.dilatations.add_row(site, row);
     }
 
+    fn counts_materials(&self) -> bool {
+        false
+    }
+
     fn is_body_row(&self, site: usize) -> bool {
         self.model
             .point_of(site)

@@ -91,6 +91,10 @@ impl<const D: usize> Operator<D> for FamilyRows<'_, D> {
         }
     }
 
+    fn counts_materials(&self) -> bool {
+        false
+    }
+
     fn is_body_row(&self, site: usize) -> bool {
         self.model.point_of(site).is_some()
     }

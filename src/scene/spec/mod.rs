@@ -8,7 +8,6 @@
 //! | `influence.rs`, `material.rs`, `named_law.rs`, `user_material.rs` | materials and peridynamics; laws known by their key; compiled routines |
 //! | `material_interface.rs` | bonds between two materials |
 //! | `region.rs` | shapes and zones |
-//! | `coupling.rs` | the coupling |
 //! | `condition.rs`, `impactor.rs` | conditions and voids, rigid impactors |
 //! | `motion.rs` | time and load steps, initial fields, deformation and fracture of bonds |
 //! | `control.rs` | solver and output |
@@ -16,7 +15,6 @@
 
 mod condition;
 mod control;
-mod coupling;
 mod impactor;
 mod influence;
 mod material;
@@ -28,14 +26,15 @@ mod region;
 mod table;
 mod user_material;
 
+pub use super::coupling_kinds::{
+    BalancedSpec, BetaSpec, BlendingSpec, CouplingSpec, CouplingTraits, CutBondsSpec, FormSpec,
+    InterfaceSpec, LatticeStart, LocalSpec, NonlocalSpec, PartialStressSpec, SpliceSpec,
+    TruncatedSpec, ZonesNeeded,
+};
 pub use condition::{TemperatureSpec, VoidSpec};
 pub use control::{
     LineSpec, OutputSpec, PointOutputSpec, ProbeSpec, SectionSpec, SolverSpec, StressSpec,
     UnprovenSpec,
-};
-pub use coupling::{
-    BetaSpec, BlendingSpec, CouplingSpec, CouplingTraits, CutBondsSpec, FormSpec, InterfaceSpec,
-    LatticeStart, NoOptionsSpec, PartialStressSpec, TruncatedSpec, ZonesNeeded,
 };
 pub use impactor::{CylinderSpec, ImpactorMotionSpec, ImpactorSpec, PlaneSpec, SphereSpec};
 pub use influence::{InfluenceSpec, MicromodulusSpec, PolynomialSpec};
@@ -49,8 +48,8 @@ pub use mesh::{
 };
 pub use motion::{
     BeyondLimitSpec, BondsSpec, CalibrationSpec, ContactSpec, ElementsSpec, ExplicitSpec,
-    GrowingModesSpec, InitialFieldSpec, InitialSpec, LoadStepSpec, PrecisionSpec, QuasiStaticSpec,
-    SolveSpec, TipSpec,
+    GrowingModesSpec, InitialFieldSpec, InitialSpec, LoadStepSpec, NoOptionsSpec, PrecisionSpec,
+    QuasiStaticSpec, SolveSpec, TipSpec,
 };
 pub use named_law::Given;
 pub use region::{
@@ -102,7 +101,7 @@ pub struct SceneSpec {
     pub zones: ZonesSpec,
     /// Coupling of the two models; also as text where no option is set, `coupling = "splice"`. Without it `truncated` where that is exact, or else `splice`; the run says which and why.
     #[serde(default)]
-    #[schemars(schema_with = "coupling::coupling_schema")]
+    #[schemars(schema_with = "super::coupling_kinds::coupling_schema")]
     pub coupling: Option<Spanned<CouplingSpec>>,
     /// Type of analysis: one state of equilibrium (default), motion in time, or a load that grows; as text where no option is set, `solve = "static"`.
     #[serde(default)]

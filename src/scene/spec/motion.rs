@@ -3,10 +3,14 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::coupling::NoOptionsSpec;
 use super::region::ShapeSpec;
 use crate::scene::expression::Expression;
 use crate::scene::value::{Automatic, Coordinates, Count, Every, Number, Steps};
+
+/// A solve without options.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NoOptionsSpec {}
 
 /// Type of analysis.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
