@@ -335,8 +335,8 @@ fn same_lattice(progress: &dyn Progress, figures: Option<&Path>) -> Result<Vec<T
         }
     }
     let sides = [
-        "conditions.left.displacement={on=\"left\", x=\"0.05*(y+0.5)\", y=\"0.05*(y+0.5)\"}",
-        "conditions.right.displacement={on=\"right\", x=\"0.05*(y+0.5)\", y=\"0.05*(y+0.5)\"}",
+        "conditions.left.displacement={on=\"left\", x=\"5e-4*(y+0.5)\", y=\"5e-4*(y+0.5)\"}",
+        "conditions.right.displacement={on=\"right\", x=\"5e-4*(y+0.5)\", y=\"5e-4*(y+0.5)\"}",
         "output.vtu=false",
     ]
     .map(String::from);
