@@ -5,15 +5,16 @@
 //! | `behaviour.rs` | how bonds deform and break, as a run asks for it |
 //! | `body_state.rs` | damage, stresses and memory, as results show them |
 //! | `heat.rs`, `heated_forces.rs` | bonds that know their temperature |
+//! | `construction.rs`, `pass_input.rs` | masses, rows and bonds of the model; input of the bond pass |
 //! | `body.rs`, `force_states.rs`, `elements.rs` | the points and their bonds, nonlinear force states, nonlinear finite elements |
 //! | `rows.rs`, `tangent_pattern.rs` | linear rows of the sites, blocks of the elements' tangent |
 //! | `energy.rs`, `stored_energy.rs`, `dissipation.rs` | energies of elements and bonds, what breaking costs |
 //! | `split.rs`, `shared_work.rs`, `own_steps.rs`, `reached_sites.rs`, `spread_families.rs` | the same on several processes |
 //!
-//! Sites whose row is that of the peridynamic body alone ([`Operator::is_body_row`]) take their force from a pass over the bonds, which may be geometrically exact
+//! Sites whose row is that of the peridynamic body alone ([`Operator::is_body_row`](crate::coupling::Operator::is_body_row)) take their force from a pass over the bonds, which may be geometrically exact
 //! and break; every other site takes it from its row of the linear stiffness, which those bonds do not enter. At rest both are the operator of the static solve.
 //!
-//! A seam that has bonds of its own ([`Operator::seam_bonds`]) takes those that are exact or break out of the rows too: what is left are finite elements.
+//! A seam that has bonds of its own ([`Operator::seam_bonds`](crate::coupling::Operator::seam_bonds)) takes those that are exact or break out of the rows too: what is left are finite elements.
 
 use std::sync::PoisonError;
 

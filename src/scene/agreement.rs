@@ -4,12 +4,13 @@ use super::error::{SceneError, SceneErrorKind};
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
 use super::solve::Solve;
-use super::spec::{CouplingSpec, ElementsSpec, SceneSpec, SolveSpec, ZonesNeeded};
+use super::spec::{CouplingSpec, CutBondsSpec, ElementsSpec, SceneSpec, SolveSpec, ZonesNeeded};
 use crate::fem::{CellBandError, banded_law, crack_band};
 use crate::mesh::Mesh;
 use crate::model::Zone;
 use crate::observe::report::number;
 use crate::peridynamics::ZeroEnergyControl;
+use crate::peridynamics::failure::Fracture;
 use crate::scene::points::Points;
 
 /// Refuses a law that is not linear where rows at the seam would not balance it: those of splice, blending, balanced and partial stress hold a uniform strain whatever stress the two sides have.
@@ -77,6 +78,19 @@ pub(crate) fn cut_bonds<const D: usize>(
     let (CouplingSpec::Truncated(typed), Some(named)) = (coupling, &spec.coupling) else {
         return Ok(());
     };
+    if typed.cut_bonds == Some(CutBondsSpec::Breaking)
+        && !material.fracture.is_none_or(Fracture::is_of_stretch)
+    {
+        return Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!(
+                "`coupling.truncated.cut-bonds` is \"breaking\", and bonds of the material `{}` break by the state of their points, which those that the seam cuts do not know",
+                material.name
+            ),
+        )
+        .label(named.span(), "cuts bonds")
+        .help("let cut-bonds = \"linear\", or leave it out, and keep damage two horizons away from the seam"));
+    }
     if typed.cut_bonds.is_none() || material.law.linearised().is_ordinary() {
         return Ok(());
     }

@@ -136,7 +136,7 @@ fn obstacle<const D: usize>(
 ) -> Result<Option<Obstacle>, SceneError> {
     let certain = |reason: &str| Ok(Some(Obstacle::Certain(reason.to_owned())));
     let follows_bonds = |e: &toml::Spanned<ElementsSpec>| *e.get_ref() == ElementsSpec::CauchyBorn;
-    let is_slow = |m: &Material<D>| m.law.accelerator().is_none();
+    let is_slow = |m: &Material<D>| !m.is_accelerated();
     if p.elements.as_ref().is_some_and(follows_bonds) && found.iter().any(is_slow) {
         return certain("elements that follow the bonds of such a law at any stretch");
     }

@@ -23,7 +23,10 @@ pub(crate) fn elements<const D: usize>(
     let Some(typed) = typed.filter(|typed| *typed.get_ref() == ElementsSpec::CauchyBorn) else {
         return Ok(ElementsSpec::Linear);
     };
-    let obstacle = coupling_without_stress(coupling, law)
+    let accelerated = used
+        .iter()
+        .all(|&m| materials[usize::from(m)].is_accelerated());
+    let obstacle = coupling_without_stress(coupling, law, accelerated)
         .or_else(|| law_without_stress((materials, used), law, bonds))
         .or_else(|| families_that_differ(spec));
     match obstacle {
@@ -41,7 +44,11 @@ pub(crate) fn elements<const D: usize>(
 type Obstacle = Option<(String, &'static str)>;
 
 /// Returns the obstacle that keeps a coupling from carrying the stress of elements that follow the bonds.
-fn coupling_without_stress<const D: usize>(coupling: &CouplingSpec, law: &dyn Law<D>) -> Obstacle {
+fn coupling_without_stress<const D: usize>(
+    coupling: &CouplingSpec,
+    law: &dyn Law<D>,
+    accelerated: bool,
+) -> Obstacle {
     let traits = coupling.traits();
     match (traits.zones, coupling) {
         (ZonesNeeded::Everywhere(Zone::Local), _) => Some((
@@ -53,7 +60,7 @@ fn coupling_without_stress<const D: usize>(coupling: &CouplingSpec, law: &dyn La
         }
         (_, CouplingSpec::Splice(_) | CouplingSpec::PartialStress(_)) => None,
         (_, CouplingSpec::Truncated(typed)) => {
-            let why = truncated_bonds(typed.cut_bonds, law).err()?;
+            let why = truncated_bonds(typed.cut_bonds, law, accelerated).err()?;
             let help =
                 "use coupling = \"splice\", or elements = \"linear\" for rotations below 2 degrees";
             Some((why, help))
@@ -126,13 +133,15 @@ fn families_that_differ(spec: &SceneSpec) -> Obstacle {
 fn truncated_bonds<const D: usize>(
     cut_bonds: Option<CutBondsSpec>,
     law: &dyn Law<D>,
+    accelerated: bool,
 ) -> Result<(), String> {
     if cut_bonds == Some(CutBondsSpec::Linear) {
         return Err("cut-bonds = \"linear\" keeps the bonds at the seam from rotating".to_owned());
     }
-    match law.accelerator() {
-        Some(_) => Ok(()),
-        None => Err(format!(
+    match (law.accelerator(), accelerated) {
+        (Some(_), true) => Ok(()),
+        (Some(_), false) => Err("bonds that end on faces follow a material that breaks by the state of its points to first order only".to_owned()),
+        (None, _) => Err(format!(
             "bonds that end on faces follow the law {} to first order only",
             law.name()
         )),

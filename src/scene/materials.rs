@@ -64,6 +64,11 @@ impl<const D: usize> Material<D> {
         self.fracture.is_some() || self.law.damages()
     }
 
+    /// Returns true if passes over its bonds are accelerated: by the law, and by a criterion of failure that is a stretch.
+    pub fn is_accelerated(&self) -> bool {
+        self.law.accelerator().is_some() && self.fracture.is_none_or(Fracture::is_of_stretch)
+    }
+
     /// The local stiffness \[Pa\].
     pub fn stiffness(&self) -> Tensor4<D> {
         Tensor4::isotropic(self.lame.0, self.lame.1)

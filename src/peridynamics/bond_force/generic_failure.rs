@@ -94,8 +94,12 @@ impl<const D: usize> Generic<D> {
         } = &mut failure
         {
             let flow = |i: usize| self.outcome[i].flow;
+            let is_known = !displacement.is_empty();
             // at the end of the step nothing more is remembered
             let bonds = |i: usize, each: &mut dyn FnMut(usize, BondResponse)| {
+                if !is_known || self.range(i).is_empty() {
+                    return;
+                }
                 let mut s = Scratch::default();
                 s.carried = self.carried_of(i).copied();
                 let (displaced, intact) = (|j| at(displacement, j), |b: usize| self.intact[b]);

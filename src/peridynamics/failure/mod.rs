@@ -48,7 +48,7 @@ pub trait FailureCriterion: Debug + Sync {
     /// Description, a sentence.
     fn about(&self) -> &'static str;
 
-    /// Returns true if materials of a law have the key.
+    /// Returns true if materials of a named law have the key. A routine of a user (`umat`) and interfaces between materials have those of a stretch alone.
     fn applies_to(&self, law: &BondTraits) -> bool;
 
     /// Threshold of the number that a scene types.
@@ -64,7 +64,7 @@ pub struct BondTraits {
     pub has_bond_energy: bool,
     /// True if points have a plastic strain.
     pub flows: bool,
-    /// True if bonds lose their stiffness by a damage of their own.
+    /// True if bonds or points lose their stiffness by a damage of the law.
     pub damages: bool,
 }
 

@@ -70,7 +70,10 @@ impl<const D: usize> NamedLaw<D> for Correspondence<D> {
     const ABOUT: &'static str = "Elastic correspondence: the local law applied to a deformation gradient averaged over the family.";
     const RATIO: Ratio = Ratio::Any;
     const KINEMATICS: &'static [Kinematics] = Kinematics::ALL;
-    const PARAMETERS: &'static [Parameter] = &[STABILISATION];
+    const PARAMETERS: &'static [Parameter] = &[Parameter {
+        most: f64::MAX,
+        ..STABILISATION
+    }];
 
     fn build(constants: Constants, values: &[f64]) -> Arc<dyn Law<D>> {
         let (lambda, shear) = (constants.lambda, constants.shear);

@@ -6,7 +6,7 @@ use crate::system::SemiDiscrete;
 /// Possibility that bonds break.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Breaks {
-    /// They may, at a critical stretch or tearing parameter.
+    /// They may, by a criterion of failure.
     Possibly,
     /// They may, by a damage that grows gradually before.
     Gradually,

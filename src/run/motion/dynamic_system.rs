@@ -77,6 +77,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
     };
     let storage = storage(breaking.precision);
     let breaks = failure_text(model, failure.as_ref(), breaking);
+    let by_state = matches!(failure, Some(BondThreshold::State(_)));
     let can_fail_nowhere = |x: &_| breaking.no_fail.iter().any(|r| r.contains(x, 0.0));
     let is_linear = is_linear(model, rest, failure.as_ref());
     let heat = rest.stresses.thermal.as_ref().filter(|_| !is_linear);
@@ -122,7 +123,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
                 &motion,
                 is_linear,
                 (bonds, breaks),
-                storage,
+                (storage, by_state),
                 choices,
             );
             Ok(DynamicSystem {
@@ -230,7 +231,7 @@ fn tell_bonds<const D: usize>(
     motion: &CoupledSystem<'_, D>,
     is_linear: bool,
     (bonds, breaks): (&str, String),
-    storage: Storage,
+    (storage, by_state): (Storage, bool),
     choices: &mut Vec<Decision>,
 ) {
     if let Some((count, why)) = motion.distribution() {
@@ -265,8 +266,23 @@ fn tell_bonds<const D: usize>(
             why: "temperature: laws and criteria see the stretch beyond free expansion, which the faster passes do not know".to_owned(),
         });
     }
+    let is_generic = motion
+        .pass()
+        .is_some_and(|pass| pass.force_states().is_some());
+    let law = model.peridynamics.as_ref().map(|p| &p.law);
+    if is_generic && by_state && law.is_some_and(|law| law.accelerator().is_some()) {
+        choices.push(Decision {
+            choice: "force states of bonds one by one".to_owned(),
+            why: "bonds break by the state of their points, which the faster passes do not know"
+                .to_owned(),
+        });
+    }
     if storage == Storage::Single {
         let (choice, why) = match model.body() {
+            Some(_) if is_generic => (
+                "precision = \"single\" changes nothing",
+                "a pass over force states keeps its weights in eight bytes",
+            ),
             Some(_) => (
                 "weights of bonds in four bytes",
                 "precision = \"single\": each bond is listed, also where the points fill a lattice, which needs no list",

@@ -3,6 +3,7 @@
 use super::RunOptions;
 use crate::coupling::Problem;
 use crate::peridynamics::bond_force::BondKinematics;
+use crate::peridynamics::failure::Fracture;
 use crate::run::setup::RunSettings;
 use crate::scene::solve::Explicit;
 use crate::scene::spec::{ElementsSpec, PrecisionSpec};
@@ -38,7 +39,10 @@ fn families_of_all<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) 
 
 /// Returns true if each process of a scene in time may hold the families of its own sites alone.
 pub(crate) fn may_share<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) -> bool {
-    problem.coupling.moves_with_own_families() && families_of_all(problem, rest).is_some()
+    problem.coupling.moves_with_own_families()
+        // a criterion of a state reads bonds from both ends
+        && rest.breaking.fracture.is_none_or(Fracture::is_of_stretch)
+        && families_of_all(problem, rest).is_some()
 }
 
 /// Returns true if each process of a static scene may do so, beside the families at a seam. Forces then have to be linear: of others each process has the rows of all sites.

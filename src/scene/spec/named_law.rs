@@ -129,6 +129,10 @@ impl<'de> Visitor<'de> for Seed {
                 Field::Own(k) => own[k] = Some(Given::Word(map.next_value()?)),
             }
         }
+        let place = |c: &'static dyn FailureCriterion| {
+            failure::all().iter().position(|o| o.key() == c.key())
+        };
+        failure.sort_by_key(|(criterion, _)| place(*criterion));
         let mut taken = |key: &str| {
             let place = COMMON.iter().position(|c| c.0 == key);
             place.and_then(|k| common[k].take())
