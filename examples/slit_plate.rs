@@ -483,7 +483,7 @@ fn draw(solved: &Solved<'_, 2>, path: &Path) -> Result<(), Failure> {
     let mut map = FieldMap {
         title: "Strain ε_xx, blending: squares are PD points".into(),
         label: "ε_xx".into(),
-        range: Some((-0.06, 0.06)),
+        range: Some((-6e-4, 6e-4)),
         cells: Vec::new(),
         points: Vec::new(),
         lines: Vec::new(),

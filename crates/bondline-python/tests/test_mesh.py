@@ -32,7 +32,7 @@ def test_a_mesh_from_meshio_with_its_groups() -> None:
         "coupling": {"blending": {"beta": "constant"}},
         "conditions": {
             "bottom": {"displacement": {"on": "bottom", "x": 0, "y": 0}},
-            "top": {"displacement": {"on": "top", "x": 0.05, "y": 0.05}},
+            "top": {"displacement": {"on": "top", "x": 5e-4, "y": 5e-4}},
         },
     }
     wanted = bondline.run(EXAMPLE, progress=False)
