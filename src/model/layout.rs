@@ -123,13 +123,17 @@ impl<const D: usize> Model<D> {
             Some(p) if self.roles.contains(&CellRole::Points) => {
                 let beyond = match self.interface {
                     Interface::Faces => Beyond::Continued,
-                    _ => Beyond::Empty,
+                    Interface::Overlap | Interface::Constrained(_) | Interface::Feet => {
+                        Beyond::Empty
+                    }
                 };
                 self.check_lattices(p)?;
                 // feet stand for what the whole lattice has beyond a face
                 let reach = match self.interface {
                     Interface::Feet => Reach::Neighbours,
-                    _ => reach(coupling, p),
+                    Interface::Overlap | Interface::Constrained(_) | Interface::Faces => {
+                        reach(coupling, p)
+                    }
                 };
                 let (mesh, zones) = (&self.mesh, &self.zones);
                 point_generation::place(mesh, zones, &self.roles, p, reach, beyond)
@@ -177,7 +181,9 @@ impl<const D: usize> Model<D> {
                 feet = Some(ends);
                 Ok(lattice)
             }
-            _ => self.grow(p, cloud, l, reach, (held, ranks)),
+            Interface::Overlap | Interface::Constrained(_) | Interface::Faces => {
+                self.grow(p, cloud, l, reach, (held, ranks))
+            }
         };
         let grown: Result<Vec<_>, ModelError> = clouds.into_iter().enumerate().map(grow).collect();
         Ok((grown?, feet))
