@@ -10,7 +10,8 @@
 //! | `ranks.rs`, `partition.rs`, `ghosts.rs`, `shared_steps.rs` | several processes, and which sites each has |
 //! | `place_stress.rs`, `body_state.rs` | the stress of a place; damage, stresses and memory of a body |
 //! | `term.rs`, `with_terms.rs` | force terms beside a body, and their sum |
-//! | `linear_motion.rs`, `wrapped.rs` | a system of a matrix, and one around another |
+//! | `tangent.rs`, `history.rs` | the tangent of a system; its memory, damage and dissipation |
+//! | `linear_motion.rs` | a system of a matrix |
 
 use crate::parallel;
 
@@ -18,6 +19,7 @@ mod body_state;
 mod element_tangent;
 mod exact_sum;
 mod ghosts;
+mod history;
 mod linear_motion;
 mod neighbour_springs;
 mod partition;
@@ -28,14 +30,15 @@ mod shared_blocks;
 mod shared_steps;
 mod spmv;
 mod springs;
+mod tangent;
 mod term;
 mod with_terms;
-pub(crate) mod wrapped;
 
 pub use body_state::BodyState;
 pub use element_tangent::ElementTangent;
 pub use exact_sum::ExactSum;
 pub use ghosts::{Ghosts, Traffic};
+pub use history::BodyHistory;
 pub use linear_motion::LinearMotion;
 pub(crate) use neighbour_springs::share_long_rows;
 pub use partition::{NeighbourGraph, Partition};
@@ -47,6 +50,7 @@ pub use shared_blocks::{GatheredRows, RowBatch, SharedRows};
 pub use shared_steps::{LostToBreaks, SharedSteps};
 pub use spmv::ROW_CHUNK;
 pub use springs::SpringRows;
+pub use tangent::Tangent;
 pub use term::{ForceTerm, RateBounds};
 pub use with_terms::WithTerms;
 
@@ -157,16 +161,16 @@ impl<'a> Halfway<'a> {
 
 /// A system that moves: `M ü = f(t) − F(u)`, with lumped masses.
 ///
-/// Shapes: `u`, `force`, `x`, `y` and the row sums have [`SemiDiscrete::block`] numbers per site. Units: \[m\], \[N\] (per area of a bar of unit section in 1D, per
-/// thickness in 2D). Every method gives the same bits for any number of threads.
-pub trait SemiDiscrete: Send + Sync {
+/// Shapes: `u` and `force` have [`SemiDiscrete::block`] numbers per site. Units: \[m\], \[N\] (per area of a bar of unit section in 1D, per
+/// thickness in 2D). Every method gives the same bits for any number of threads, and every method is required: a force, an energy or a bound that a system does not have is a zero that it writes down.
+pub trait SemiDiscrete: Tangent + BodyHistory + Send + Sync {
     /// Unknowns per site (the dimension).
     fn block(&self) -> usize;
 
     /// Lumped mass of each site \[kg\].
     fn mass(&self) -> &[f64];
 
-    /// Overwrites `force` with the internal force `F(u, t, Δt)` at the end of an interval that begins where [`SemiDiscrete::commit`] was called last (`K u` of a linear system); returns how many bonds this pass broke.
+    /// Overwrites `force` with the internal force `F(u, t, Δt)` at the end of an interval that begins where [`BodyHistory::commit`] was called last (`K u` of a linear system); returns how many bonds this pass broke.
     fn internal_force_into(
         &mut self,
         u: &[f64],
@@ -175,129 +179,39 @@ pub trait SemiDiscrete: Send + Sync {
         breakage: FailureUpdate,
     ) -> u64;
 
-    /// Ends the interval at the displacement of the last call of [`SemiDiscrete::internal_force_into`]: what laws remember is from now on what they remembered there. A trial that is not committed leaves no trace.
-    fn commit(&mut self);
+    /// As [`SemiDiscrete::internal_force_into`] with bonds held, but without what [`Tangent::element_tangent`] is the tangent of: forces that are differenced. All of them where that is none.
+    fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval);
 
-    /// The work that changes of temperature have done since it was last asked for \[J\], up to the last [`SemiDiscrete::commit`]: of bonds whose stored energy knows their temperature.
-    fn take_heat_work(&mut self) -> f64 {
-        0.0
-    }
+    /// The work that changes of temperature have done since it was last asked for \[J\], up to the last [`BodyHistory::commit`]: of bonds whose stored energy knows their temperature.
+    fn take_heat_work(&mut self) -> f64;
 
     /// Overwrites `force` with the internal force at `u` as it was at the time `from` (none: before anything expanded), and what the change of temperature until `to` adds to first order; false, and nothing done, where no bond knows its temperature.
     ///
     /// A step sets out by this: bonds that soften must not see the whole change of a temperature before the body has given way to it.
     fn force_of_heating_into(
         &mut self,
-        _u: &[f64],
-        _force: &mut [f64],
-        _from: Option<f64>,
-        _to: f64,
-    ) -> bool {
-        false
-    }
-
-    /// The system as one of which each process may move its own sites alone; none where each has to have the numbers of all in every step.
-    fn shared_steps(&mut self) -> Option<&mut dyn SharedSteps> {
-        None
-    }
-
-    /// `own` sites and all whose displacements the forces of these take, where processes may each move their own; none where each has to have the numbers of all.
-    ///
-    /// Shapes: one entry per site.
-    fn sites_reached(&self, _own: &[bool]) -> Option<Vec<bool>> {
-        None
-    }
-
-    /// `y = K x` with the tangent `K` at rest, broken bonds left out.
-    fn tangent_into(&self, x: &[f64], y: &mut [f64]);
-
-    /// The displacement \[m\] over which forces are differenced where the tangent at a displacement is wanted, far below the distance of sites; none where forces with bonds held
-    /// are linear, so that the tangent at rest is that at any displacement.
-    fn difference_length(&self) -> Option<f64>;
-
-    /// Returns the part of the tangent that finite elements add to that at rest at a displacement that ends an interval, in closed form; none if no element's law is nonlinear, or if the system does not know.
-    fn element_tangent(&self, _u: &[f64], _interval: Interval) -> Option<ElementTangent> {
-        None
-    }
-
-    /// As [`SemiDiscrete::internal_force_into`] with bonds held, but without what [`SemiDiscrete::element_tangent`] is the tangent of: forces that are differenced.
-    fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {
-        self.internal_force_into(u, force, interval, FailureUpdate::Frozen);
-    }
-
-    /// Norm of the force \[N\] that rounding of places leaves at a displacement, beside that of the rounding of the displacement; none but where forces depend on places (contact).
-    fn round_off(&self, _u: &[f64]) -> f64 {
-        0.0
-    }
-
-    /// For every unknown an upper bound of `Σ_b |K_ab|`, with the tangent at rest.
-    fn row_sums(&self) -> Vec<f64>;
-
-    /// Upper bound of the part that forces absent from the state at rest (contact) may add to the eigenvalues of `M⁻¹ K` \[1/s²\].
-    fn contact_frequency_bound(&self) -> f64 {
-        0.0
-    }
-
-    /// Upper bound of the eigenvalues of `M⁻¹ C` of forces `C v` against the velocities of the interval \[1/s\].
-    fn drag_rate_bound(&self) -> f64 {
-        0.0
-    }
-
-    /// Returns true for each site whose tangent, its row and its column, never changes; false for all if the system does not know.
-    fn tangent_is_constant(&self) -> Vec<bool> {
-        vec![false; self.mass().len()]
-    }
-
-    /// Rows of the tangent at rest, in the order of `sites`: those of [`SemiDiscrete::tangent_is_constant`] sites and of sites that these are columns of.
-    fn tangent_rows(&self, _sites: &[u32]) -> BlockCsr {
-        BlockCsr::default()
-    }
-
-    /// Rows of the tangent at rest, in the order of `sites`, less what does not expand or knows its temperature itself: by these a free expansion loads the sites.
-    fn rows_that_expand(&self, sites: &[u32]) -> BlockCsr {
-        self.tangent_rows(sites)
-    }
-
-    /// The sites at which rows of the tangent may differ from their columns; all of them if the system does not know.
-    fn seam_sites(&self) -> Vec<u32> {
-        (0..self.mass().len() as u32).collect()
-    }
-
-    /// The state of the body, as results show it; none of a linear system in which nothing breaks.
-    fn body_state(&self) -> Option<&dyn BodyState>;
-
-    /// Returns the symmetry of the tangent; if it is symmetric there is an energy to conserve.
-    fn symmetry(&self) -> Symmetry;
+        u: &[f64],
+        force: &mut [f64],
+        from: Option<f64>,
+        to: f64,
+    ) -> bool;
 
     /// Energy stored in the bodies \[J\]; of a coupled system the sum of the bodies' own energies, which the motion conserves only as far as the seam does.
     fn stored_energy(&self, u: &[f64]) -> f64;
 
-    /// Returns the cost of the bonds broken so far; none if nothing can break.
-    fn dissipation(&self) -> Option<Dissipation> {
-        None
-    }
+    /// Norm of the force \[N\] that rounding of places leaves at a displacement, beside that of the rounding of the displacement; none but where forces depend on places (contact).
+    fn round_off(&self, u: &[f64]) -> f64;
 
-    /// Puts an earlier account of [`SemiDiscrete::dissipation`] in the place of this one: that of another layout of the same body.
-    fn set_dissipation(&mut self, _dissipation: Dissipation) {}
+    /// Upper bounds of what forces that the tangent at rest does not show may add to the eigenvalues of the motion.
+    fn rate_bounds(&self) -> RateBounds;
 
-    /// Adds to the account the cost of the bonds that the last call of [`SemiDiscrete::internal_force_into`] broke, with the energies of the displacement `at`.
-    /// A driver that lets bonds break calls this before anything else.
-    fn account_for_breaks(&mut self, _at: &Halfway<'_>) {}
+    /// The system as one of which each process may move its own sites alone; none where each has to have the numbers of all in every step.
+    fn shared_steps(&mut self) -> Option<&mut dyn SharedSteps>;
 
-    /// All energy of [`SemiDiscrete::dissipation`] \[J\].
-    fn dissipated_energy(&self) -> Option<f64> {
-        self.dissipation().map(|d| d.total())
-    }
-
-    /// Returns the state of damage (one bit per bond, and what cannot be recomputed from it), for a checkpoint; empty without damage.
-    fn damage_state(&self) -> Vec<u64> {
-        Vec::new()
-    }
-
-    /// Restores the state that [`SemiDiscrete::damage_state`] gave; false if it belongs to another model.
-    fn restore_damage(&mut self, state: &[u64]) -> bool {
-        state.is_empty()
-    }
+    /// `own` sites and all whose displacements the forces of these take, where processes may each move their own; none where each has to have the numbers of all.
+    ///
+    /// Shapes: one entry per site.
+    fn sites_reached(&self, own: &[bool]) -> Option<Vec<bool>>;
 }
 
 /// A square block-sparse matrix by rows; each entry is a dense `block × block` matrix, row-major.

@@ -24,8 +24,8 @@ use crate::{
     model::Model,
     peridynamics::bond_force::HeatedBonds,
     system::{
-        BlockCsr, BodyState, Dissipation, ElementTangent, FailureUpdate, Halfway, Interval,
-        SemiDiscrete, SharedSteps, Symmetry,
+        BlockCsr, BodyHistory, BodyState, Dissipation, ElementTangent, FailureUpdate, Halfway,
+        Interval, RateBounds, SemiDiscrete, SharedSteps, Symmetry, Tangent,
     },
 };
 use behaviour::NONE;
@@ -81,7 +81,7 @@ pub struct CoupledSystem<'a, const D: usize> {
     own_steps: Option<own_steps::OwnSteps>,
     /// Dissipation by breaking bonds so far.
     spent: Dissipation,
-    /// See [`SemiDiscrete::difference_length`].
+    /// See [`Tangent::difference_length`].
     difference_length: Option<f64>,
 }
 
@@ -115,24 +115,6 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         broken
     }
 
-    fn shared_steps(&mut self) -> Option<&mut dyn SharedSteps> {
-        let may_share = || self.split.is_some() && self.may_share_steps();
-        match self.own_steps.is_some() || may_share() {
-            true => Some(self),
-            false => None,
-        }
-    }
-
-    fn sites_reached(&self, own: &[bool]) -> Option<Vec<bool>> {
-        self.may_share_steps().then(|| self.reached_from(own).sites)
-    }
-
-    fn element_tangent(&self, u: &[f64], interval: Interval) -> Option<ElementTangent> {
-        let elements = self.elements.as_ref()?;
-        let is_whole = self.body.is_none();
-        Some(elements.tangent(self.model, u, interval.length, is_whole))
-    }
-
     fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {
         self.linear_rows_and_bonds_into(u, force, interval, FailureUpdate::Frozen);
         self.finish(force);
@@ -153,15 +135,63 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         self.extrapolate_heating(u, force, from, to)
     }
 
-    fn commit(&mut self) {
-        if let Some(body) = &mut self.body {
-            self.spent.inelastic += body.pass.commit();
-        }
-        if let Some(elements) = &mut self.elements {
-            self.spent.inelastic += elements.commit();
+    fn stored_energy(&self, u: &[f64]) -> f64 {
+        let beyond = self.elements.as_ref().map(|e| e.stored(self.model, u));
+        self.energy_of_linear_elements_and_bonds(u) + beyond.unwrap_or(0.0)
+    }
+
+    fn round_off(&self, _u: &[f64]) -> f64 {
+        0.0
+    }
+
+    fn rate_bounds(&self) -> RateBounds {
+        let Some(body) = &self.body else {
+            return RateBounds::default();
+        };
+        // a point that is no site has no row
+        let mass = |point: usize| match body.site_of_point[point] {
+            NONE => f64::INFINITY,
+            site => self.mass[site as usize],
+        };
+        RateBounds {
+            stiffness: self.bound_of_contact(body),
+            drag: body.pass.drag_rate(&mass),
         }
     }
 
+    fn shared_steps(&mut self) -> Option<&mut dyn SharedSteps> {
+        let may_share = || self.split.is_some() && self.may_share_steps();
+        match self.own_steps.is_some() || may_share() {
+            true => Some(self),
+            false => None,
+        }
+    }
+
+    fn sites_reached(&self, own: &[bool]) -> Option<Vec<bool>> {
+        self.may_share_steps().then(|| self.reached_from(own).sites)
+    }
+}
+
+impl<const D: usize> CoupledSystem<'_, D> {
+    /// Upper bound of what contact between points may add to the eigenvalues of `M⁻¹ K` \[1/s²\].
+    fn bound_of_contact(&self, body: &MovingBody<D>) -> f64 {
+        let Some(contact) = &body.contact else {
+            return 0.0;
+        };
+        let contact = contact.lock().unwrap_or_else(PoisonError::into_inner);
+        let scale = self.model.row_scale();
+        let factor = |site: usize| scale.map_or(1.0, |scale| scale[site]);
+        body.bonds_of_site
+            .iter()
+            .zip(&self.mass)
+            .enumerate()
+            .filter(|(_, (point, _))| **point != NONE)
+            .map(|(site, (&point, mass))| factor(site) * contact.stiffest(point as usize) / mass)
+            .fold(0.0, f64::max)
+    }
+}
+
+impl<const D: usize> Tangent for CoupledSystem<'_, D> {
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
         let Some(body) = &self.body else {
             self.linear.multiply_into::<D>(x, None, &mut Vec::new(), y);
@@ -218,33 +248,6 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         sums
     }
 
-    fn contact_frequency_bound(&self) -> f64 {
-        let Some(body) = &self.body else { return 0.0 };
-        let Some(contact) = &body.contact else {
-            return 0.0;
-        };
-        let contact = contact.lock().unwrap_or_else(PoisonError::into_inner);
-        let scale = self.model.row_scale();
-        let factor = |site: usize| scale.map_or(1.0, |scale| scale[site]);
-        body.bonds_of_site
-            .iter()
-            .zip(&self.mass)
-            .enumerate()
-            .filter(|(_, (point, _))| **point != NONE)
-            .map(|(site, (&point, mass))| factor(site) * contact.stiffest(point as usize) / mass)
-            .fold(0.0, f64::max)
-    }
-
-    fn drag_rate_bound(&self) -> f64 {
-        let Some(body) = &self.body else { return 0.0 };
-        // a point that is no site has no row
-        let mass = |point: usize| match body.site_of_point[point] {
-            NONE => f64::INFINITY,
-            site => self.mass[site as usize],
-        };
-        body.pass.drag_rate(&mass)
-    }
-
     fn tangent_is_constant(&self) -> Vec<bool> {
         let breaks = self.breaks();
         let at_seam = |site: usize| self.seam.as_ref().is_some_and(|s| s.touches(site));
@@ -279,9 +282,21 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         self.symmetry
     }
 
-    fn stored_energy(&self, u: &[f64]) -> f64 {
-        let beyond = self.elements.as_ref().map(|e| e.stored(self.model, u));
-        self.energy_of_linear_elements_and_bonds(u) + beyond.unwrap_or(0.0)
+    fn element_tangent(&self, u: &[f64], interval: Interval) -> Option<ElementTangent> {
+        let elements = self.elements.as_ref()?;
+        let is_whole = self.body.is_none();
+        Some(elements.tangent(self.model, u, interval.length, is_whole))
+    }
+}
+
+impl<const D: usize> BodyHistory for CoupledSystem<'_, D> {
+    fn commit(&mut self) {
+        if let Some(body) = &mut self.body {
+            self.spent.inelastic += body.pass.commit();
+        }
+        if let Some(elements) = &mut self.elements {
+            self.spent.inelastic += elements.commit();
+        }
     }
 
     fn dissipation(&self) -> Option<Dissipation> {
@@ -296,10 +311,6 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         let spent = self.of_last_breaks(at);
         self.spent.energy += spent.energy;
         self.spent.area += spent.area;
-    }
-
-    fn body_state(&self) -> Option<&dyn BodyState> {
-        Some(self)
     }
 
     fn damage_state(&self) -> Vec<u64> {
@@ -342,5 +353,9 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
             };
         }
         fits
+    }
+
+    fn body_state(&self) -> Option<&dyn BodyState> {
+        Some(self)
     }
 }

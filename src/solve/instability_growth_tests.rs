@@ -1,5 +1,9 @@
 use super::*;
 use crate::solve::stable_step::{stable_step, tests::springs};
+use crate::system::{
+    BlockCsr, BodyHistory, BodyState, Dissipation, ElementTangent, FailureUpdate, Halfway,
+    Interval, RateBounds, SharedSteps, Tangent,
+};
 
 /// Stores no zeros, of which most of a row of springs consists.
 fn leave_out_zeros(system: &mut crate::system::LinearMotion) {
@@ -175,42 +179,118 @@ impl SemiDiscrete for Fed {
     fn block(&self) -> usize {
         1
     }
+
     fn mass(&self) -> &[f64] {
         self.system.mass()
     }
+
     fn internal_force_into(
         &mut self,
         u: &[f64],
         force: &mut [f64],
-        interval: crate::system::Interval,
-        b: crate::system::FailureUpdate,
+        interval: Interval,
+        b: FailureUpdate,
     ) -> u64 {
         self.system.internal_force_into(u, force, interval, b)
     }
-    fn commit(&mut self) {}
+
+    fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {
+        self.internal_force_into(u, force, interval, FailureUpdate::Frozen);
+    }
+
+    fn take_heat_work(&mut self) -> f64 {
+        0.0
+    }
+
+    fn force_of_heating_into(
+        &mut self,
+        _u: &[f64],
+        _force: &mut [f64],
+        _from: Option<f64>,
+        _to: f64,
+    ) -> bool {
+        false
+    }
+
+    fn stored_energy(&self, u: &[f64]) -> f64 {
+        self.system.stored_energy(u)
+    }
+
+    fn round_off(&self, _u: &[f64]) -> f64 {
+        0.0
+    }
+
+    fn rate_bounds(&self) -> RateBounds {
+        RateBounds::default()
+    }
+
+    fn shared_steps(&mut self) -> Option<&mut dyn SharedSteps> {
+        None
+    }
+
+    fn sites_reached(&self, _own: &[bool]) -> Option<Vec<bool>> {
+        None
+    }
+}
+
+impl Tangent for Fed {
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
         self.system.tangent_into(x, y);
     }
+
     fn difference_length(&self) -> Option<f64> {
         None
     }
+
     fn row_sums(&self) -> Vec<f64> {
         self.system.row_sums()
     }
-    fn tangent_rows(&self, sites: &[u32]) -> crate::system::BlockCsr {
+
+    fn tangent_is_constant(&self) -> Vec<bool> {
+        vec![false; self.mass().len()]
+    }
+
+    fn tangent_rows(&self, sites: &[u32]) -> BlockCsr {
         self.system.tangent_rows(sites)
     }
+
+    fn rows_that_expand(&self, sites: &[u32]) -> BlockCsr {
+        self.tangent_rows(sites)
+    }
+
     fn seam_sites(&self) -> Vec<u32> {
         self.sites.clone()
-    }
-    fn body_state(&self) -> Option<&dyn crate::system::BodyState> {
-        None
     }
 
     fn symmetry(&self) -> Symmetry {
         Symmetry::Unsymmetric
     }
-    fn stored_energy(&self, u: &[f64]) -> f64 {
-        self.system.stored_energy(u)
+
+    fn element_tangent(&self, _u: &[f64], _interval: Interval) -> Option<ElementTangent> {
+        None
+    }
+}
+
+impl BodyHistory for Fed {
+    fn commit(&mut self) {}
+
+    fn dissipation(&self) -> Option<Dissipation> {
+        None
+    }
+
+    fn set_dissipation(&mut self, _dissipation: Dissipation) {}
+
+    fn account_for_breaks(&mut self, _at: &Halfway<'_>) {}
+
+    fn damage_state(&self) -> Vec<u64> {
+        Vec::new()
+    }
+
+    fn restore_damage(&mut self, state: &[u64]) -> bool {
+        state.is_empty()
+    }
+
+    fn body_state(&self) -> Option<&dyn BodyState> {
+        None
     }
 }

@@ -5,6 +5,10 @@ use crate::{
     solve::statics::{self, StaticParams, StaticProblem},
     system::{BlockCsr, LinearMotion},
 };
+use systems::{Bundle, Hardening};
+
+#[path = "quasi_static_test_systems.rs"]
+mod systems;
 
 /// A chain of springs of uneven stiffness; `skew` makes its rows differ from its columns.
 fn chain(n: usize, skew: f64) -> LinearMotion {
@@ -150,87 +154,6 @@ fn without_breaking_it_is_the_static_solve() {
             info.steps == 2 && info.broken == 0 && worst < 1e-8,
             "{skew} {equilibrium:?}: {worst} {info:?}"
         );
-    }
-}
-
-/// Site 0 is held; fibres of stiffness 1 join it to site 1 and break beyond their own elongation; a spring of stiffness `spring` joins site 1 to site 2.
-struct Bundle {
-    limits: Vec<f64>,
-    intact: Vec<bool>,
-    spring: f64,
-    mass: [f64; 3],
-}
-
-impl Bundle {
-    fn new(count: usize, spring: f64) -> Bundle {
-        Bundle {
-            limits: (1..=count).map(|i| i as f64 / count as f64).collect(),
-            intact: vec![true; count],
-            spring,
-            mass: [1.0; 3],
-        }
-    }
-
-    fn alive(&self) -> f64 {
-        self.intact.iter().filter(|i| **i).count() as f64
-    }
-}
-
-impl SemiDiscrete for Bundle {
-    fn block(&self) -> usize {
-        1
-    }
-
-    fn mass(&self) -> &[f64] {
-        &self.mass
-    }
-
-    fn commit(&mut self) {}
-
-    fn internal_force_into(
-        &mut self,
-        u: &[f64],
-        force: &mut [f64],
-        _interval: Interval,
-        breakage: FailureUpdate,
-    ) -> u64 {
-        let mut broken = 0;
-        if breakage == FailureUpdate::Update {
-            for (intact, limit) in self.intact.iter_mut().zip(&self.limits) {
-                if *intact && u[1] - u[0] > *limit {
-                    *intact = false;
-                    broken += 1;
-                }
-            }
-        }
-        self.tangent_into(u, force);
-        broken
-    }
-
-    fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
-        let (fibres, spring) = (self.alive() * (x[1] - x[0]), self.spring * (x[2] - x[1]));
-        y.copy_from_slice(&[-fibres, fibres - spring, spring]);
-    }
-
-    fn difference_length(&self) -> Option<f64> {
-        None
-    }
-
-    fn row_sums(&self) -> Vec<f64> {
-        let (n, s) = (self.alive(), self.spring);
-        vec![2.0 * n, 2.0 * (n + s), 2.0 * s]
-    }
-
-    fn body_state(&self) -> Option<&dyn crate::system::BodyState> {
-        None
-    }
-
-    fn symmetry(&self) -> Symmetry {
-        Symmetry::Symmetric
-    }
-
-    fn stored_energy(&self, u: &[f64]) -> f64 {
-        0.5 * (self.alive() * (u[1] - u[0]).powi(2) + self.spring * (u[2] - u[1]).powi(2))
     }
 }
 
@@ -452,76 +375,6 @@ fn trouble_is_named() {
         matches!(error, Err(QuasiStaticError::NotFinite { .. })),
         "{error:?}"
     );
-}
-
-/// A chain whose springs bear `k e + b e³` at the elongation `e`.
-struct Hardening {
-    k: Vec<f64>,
-    b: f64,
-    mass: Vec<f64>,
-}
-
-impl SemiDiscrete for Hardening {
-    fn block(&self) -> usize {
-        1
-    }
-
-    fn mass(&self) -> &[f64] {
-        &self.mass
-    }
-
-    fn commit(&mut self) {}
-
-    fn internal_force_into(
-        &mut self,
-        u: &[f64],
-        force: &mut [f64],
-        _interval: Interval,
-        _breakage: FailureUpdate,
-    ) -> u64 {
-        force.fill(0.0);
-        for (i, k) in self.k.iter().enumerate() {
-            let e = u[i + 1] - u[i];
-            let f = k * e + self.b * e.powi(3);
-            force[i] -= f;
-            force[i + 1] += f;
-        }
-        0
-    }
-
-    fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
-        y.fill(0.0);
-        for (i, k) in self.k.iter().enumerate() {
-            let f = k * (x[i + 1] - x[i]);
-            y[i] -= f;
-            y[i + 1] += f;
-        }
-    }
-
-    fn difference_length(&self) -> Option<f64> {
-        Some(1e-7)
-    }
-
-    fn row_sums(&self) -> Vec<f64> {
-        let mut sums = vec![0.0; self.mass.len()];
-        for (i, k) in self.k.iter().enumerate() {
-            sums[i] += 2.0 * k;
-            sums[i + 1] += 2.0 * k;
-        }
-        sums
-    }
-
-    fn body_state(&self) -> Option<&dyn crate::system::BodyState> {
-        None
-    }
-
-    fn symmetry(&self) -> Symmetry {
-        Symmetry::Symmetric
-    }
-
-    fn stored_energy(&self, _u: &[f64]) -> f64 {
-        0.0
-    }
 }
 
 #[test]

@@ -9,9 +9,9 @@
 //!   `k` products on `n` unknowns `λ ≤ θ/(1 − ε)` fails with a probability of at most `1.648 √n exp(−√ε (2k − 1))` (\[Kuczynski1992\], theorem 3, symmetric);
 //!   `ε` is [`MARGIN`], and `k` is chosen for one in 10⁹. Without symmetry there is no such theorem and the same margin is kept.
 //!
-//! A drag, `M ü + C v̄ + K u = f` with the velocity `v̄` of the step before, has the energy of `M − Δt C/2 − Δt² K/4`: with the bound Γ of [`SemiDiscrete::drag_rate_bound`] the step is stable while `ω² Δt² + 2 Γ Δt < 4`.
+//! A drag, `M ü + C v̄ + K u = f` with the velocity `v̄` of the step before, has the energy of `M − Δt C/2 − Δt² K/4`: with the bound Γ of [`RateBounds::drag`] the step is stable while `ω² Δt² + 2 Γ Δt < 4`.
 //!
-//! Contact is not in the tangent at rest: what it may add to λ at most ([`SemiDiscrete::contact_frequency_bound`]) is added to both bounds.
+//! Contact is not in the tangent at rest: what it may add to λ at most ([`RateBounds::stiffness`]) is added to both bounds.
 //!
 //! The second question is that of [`crate::solve::instability_growth`].
 
@@ -20,7 +20,7 @@ use crate::{
         FreeDofs,
         krylov::{add_scaled, dot, norm},
     },
-    system::{SemiDiscrete, Symmetry},
+    system::{RateBounds, SemiDiscrete, Symmetry},
 };
 
 /// `ε`: the largest eigenvalue is taken to be `1/(1 − ε)` times the largest Ritz value, which costs 2 % of the step.
@@ -265,15 +265,17 @@ fn limits(
             (largest, certified_site) = (sum / mass, site);
         }
     }
+    let RateBounds {
+        stiffness: hidden,
+        drag,
+    } = system.rate_bounds();
     // a force against the velocity of half a step before: stable while ω² Δt² + 2 Γ Δt < 4
-    let drag = system.drag_rate_bound();
     let step_of = |square: f64| match drag > 0.0 {
         true => 4.0 / (drag + (drag * drag + 4.0 * square).sqrt()),
         false => 2.0 / square.sqrt(),
     };
     let certified = step_of(largest);
     // eigenvalues of a sum are at most the sum of the largest ones
-    let hidden = system.contact_frequency_bound();
     let bound = |theta: f64, margin: f64| step_of(theta / (1.0 - margin) + hidden);
     let unknowns = operator.free.count();
     let is_symmetric = system.symmetry() == Symmetry::Symmetric;

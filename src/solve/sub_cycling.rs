@@ -16,8 +16,8 @@
 use crate::{
     solve::stable_step::{self, StepError, StepLimit},
     system::{
-        BlockCsr, FailureUpdate, Interval, SemiDiscrete, Symmetry,
-        wrapped::{fields_of, state_of},
+        BlockCsr, BodyHistory, BodyState, Dissipation, ElementTangent, FailureUpdate, Halfway,
+        Interval, RateBounds, SemiDiscrete, SharedSteps, Symmetry, Tangent,
     },
 };
 
@@ -154,7 +154,7 @@ fn rates(system: &dyn SemiDiscrete, is_free: &[bool]) -> Vec<f64> {
 impl FineSites {
     /// The sites that limit the step, for `sub_steps` steps of them; `prescribed` lists the dofs that are not free.
     ///
-    /// Fine are sites whose row sum over mass exceeds the bound of the coarse step, where nothing breaks ([`SemiDiscrete::tangent_is_constant`]).
+    /// Fine are sites whose row sum over mass exceeds the bound of the coarse step, where nothing breaks ([`Tangent::tangent_is_constant`]).
     ///
     /// # Errors
     /// [`SubCyclingError`].
@@ -360,9 +360,6 @@ fn restricted(rows: &BlockCsr, sites: &[u32]) -> BlockCsr {
 }
 
 impl SemiDiscrete for SubCycled<'_> {
-    state_of!(system);
-    fields_of!(system);
-
     fn block(&self) -> usize {
         self.system.block()
     }
@@ -385,6 +382,46 @@ impl SemiDiscrete for SubCycled<'_> {
         broken
     }
 
+    fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {
+        self.internal_force_into(u, force, interval, FailureUpdate::Frozen);
+    }
+
+    fn take_heat_work(&mut self) -> f64 {
+        self.system.take_heat_work()
+    }
+
+    fn force_of_heating_into(
+        &mut self,
+        _u: &[f64],
+        _force: &mut [f64],
+        _from: Option<f64>,
+        _to: f64,
+    ) -> bool {
+        false
+    }
+
+    fn stored_energy(&self, u: &[f64]) -> f64 {
+        self.system.stored_energy(u)
+    }
+
+    fn round_off(&self, u: &[f64]) -> f64 {
+        self.system.round_off(u)
+    }
+
+    fn rate_bounds(&self) -> RateBounds {
+        self.system.rate_bounds()
+    }
+
+    fn shared_steps(&mut self) -> Option<&mut dyn SharedSteps> {
+        None
+    }
+
+    fn sites_reached(&self, _own: &[bool]) -> Option<Vec<bool>> {
+        None
+    }
+}
+
+impl Tangent for SubCycled<'_> {
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
         self.system.tangent_into(x, y);
         self.correct(&self.fine.columns, Terms::Signed, y);
@@ -402,12 +439,58 @@ impl SemiDiscrete for SubCycled<'_> {
         sums
     }
 
-    fn contact_frequency_bound(&self) -> f64 {
-        self.system.contact_frequency_bound()
+    fn tangent_is_constant(&self) -> Vec<bool> {
+        vec![false; self.mass().len()]
     }
 
-    fn stored_energy(&self, u: &[f64]) -> f64 {
-        self.system.stored_energy(u)
+    fn tangent_rows(&self, _sites: &[u32]) -> BlockCsr {
+        BlockCsr::default()
+    }
+
+    fn rows_that_expand(&self, sites: &[u32]) -> BlockCsr {
+        self.system.rows_that_expand(sites)
+    }
+
+    fn seam_sites(&self) -> Vec<u32> {
+        self.system.seam_sites()
+    }
+
+    fn symmetry(&self) -> Symmetry {
+        self.system.symmetry()
+    }
+
+    fn element_tangent(&self, u: &[f64], interval: Interval) -> Option<ElementTangent> {
+        self.system.element_tangent(u, interval)
+    }
+}
+
+impl BodyHistory for SubCycled<'_> {
+    fn commit(&mut self) {
+        self.system.commit();
+    }
+
+    fn dissipation(&self) -> Option<Dissipation> {
+        self.system.dissipation()
+    }
+
+    fn set_dissipation(&mut self, dissipation: Dissipation) {
+        self.system.set_dissipation(dissipation);
+    }
+
+    fn account_for_breaks(&mut self, at: &Halfway<'_>) {
+        self.system.account_for_breaks(at);
+    }
+
+    fn damage_state(&self) -> Vec<u64> {
+        self.system.damage_state()
+    }
+
+    fn restore_damage(&mut self, state: &[u64]) -> bool {
+        self.system.restore_damage(state)
+    }
+
+    fn body_state(&self) -> Option<&dyn BodyState> {
+        self.system.body_state()
     }
 }
 

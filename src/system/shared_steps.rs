@@ -33,7 +33,7 @@ pub trait SharedSteps {
     /// Returns the cost of the bonds of own sites that broke in the last force.
     fn lost(&self, at: &Halfway<'_>) -> LostToBreaks;
 
-    /// Adds the losses of all processes to the account of [`super::SemiDiscrete::dissipation`].
+    /// Adds the losses of all processes to the account of [`super::BodyHistory::dissipation`].
     fn spend(&mut self, lost: &LostToBreaks);
 
     /// Collective: overwrites each number with the sum of those of all processes.

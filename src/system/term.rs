@@ -2,7 +2,7 @@
 
 use super::{Interval, SpringRows};
 
-/// Bounds of the part that a term may add to the eigenvalues of the motion.
+/// Upper bounds of the part that a term, or all forces of a system, may add to the eigenvalues of the motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RateBounds {
     /// Of `M⁻¹ K` that rest does not show \[1/s²\]: contact.

@@ -3,10 +3,9 @@
 use std::ops::DerefMut;
 use std::sync::Arc;
 
-use super::wrapped::body_of;
 use super::{
-    BlockCsr, Dissipation, ElementTangent, FailureUpdate, ForceTerm, Halfway, Interval,
-    SemiDiscrete,
+    BlockCsr, BodyHistory, BodyState, Dissipation, ElementTangent, FailureUpdate, ForceTerm,
+    Halfway, Interval, RateBounds, SemiDiscrete, SharedSteps, Symmetry, Tangent,
 };
 
 /// `F_body(u) + Σ F_k(u)`: the sites of the body first, after them those that a term has of its own.
@@ -63,8 +62,6 @@ where
     S: DerefMut + Send + Sync,
     S::Target: SemiDiscrete,
 {
-    body_of!(body);
-
     fn block(&self) -> usize {
         self.body.block()
     }
@@ -93,11 +90,15 @@ where
         broken
     }
 
-    fn commit(&mut self) {
-        self.body.commit();
-        if let Some((u, interval)) = self.last.as_ref().filter(|(u, _)| !u.is_empty()) {
-            self.terms.iter().for_each(|term| term.commit(u, *interval));
-        }
+    fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {
+        let (own, rest) = force.split_at_mut(self.dofs);
+        rest.fill(0.0);
+        (self.body).force_beside_elements_into(&u[..self.dofs], own, interval);
+        self.add_terms(u, force, interval);
+    }
+
+    fn take_heat_work(&mut self) -> f64 {
+        self.body.take_heat_work()
     }
 
     fn force_of_heating_into(
@@ -120,6 +121,44 @@ where
         is_heated
     }
 
+    fn stored_energy(&self, u: &[f64]) -> f64 {
+        let of_terms: f64 = self.terms.iter().map(|term| term.energy(u)).sum();
+        self.body.stored_energy(self.own(u)) + of_terms
+    }
+
+    fn round_off(&self, u: &[f64]) -> f64 {
+        let of_terms: f64 = self.terms.iter().map(|term| term.round_off(u)).sum();
+        self.body.round_off(self.own(u)) + of_terms
+    }
+
+    fn rate_bounds(&self) -> RateBounds {
+        let mass = self.body.mass();
+        let of_terms: Vec<RateBounds> = (self.terms.iter())
+            .map(|term| term.rate_bounds(mass))
+            .collect();
+        let stiffness: f64 = of_terms.iter().map(|bounds| bounds.stiffness).sum();
+        let drag: f64 = of_terms.iter().map(|bounds| bounds.drag).sum();
+        let of_body = self.body.rate_bounds();
+        RateBounds {
+            stiffness: of_body.stiffness + stiffness,
+            drag: of_body.drag + drag,
+        }
+    }
+
+    fn shared_steps(&mut self) -> Option<&mut dyn SharedSteps> {
+        None
+    }
+
+    fn sites_reached(&self, _own: &[bool]) -> Option<Vec<bool>> {
+        None
+    }
+}
+
+impl<S> Tangent for WithTerms<'_, S>
+where
+    S: DerefMut + Send + Sync,
+    S::Target: SemiDiscrete,
+{
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
         let (own, rest) = y.split_at_mut(self.dofs);
         rest.fill(0.0);
@@ -138,50 +177,12 @@ where
             .reduce(f64::min)
     }
 
-    fn element_tangent(&self, u: &[f64], interval: Interval) -> Option<ElementTangent> {
-        let mut found = self.body.element_tangent(self.own(u), interval)?;
-        // own sites are no nodes; what is not linear is differenced
-        let end = found.excess.columns.len();
-        found.excess.row_offsets.resize(self.mass.len() + 1, end);
-        let is_linear = |t: &Arc<dyn ForceTerm + '_>| t.difference_length().is_none();
-        found.is_whole &= self.terms.iter().all(is_linear);
-        Some(found)
-    }
-
-    fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {
-        let (own, rest) = force.split_at_mut(self.dofs);
-        rest.fill(0.0);
-        (self.body).force_beside_elements_into(&u[..self.dofs], own, interval);
-        self.add_terms(u, force, interval);
-    }
-
-    fn round_off(&self, u: &[f64]) -> f64 {
-        let of_terms: f64 = self.terms.iter().map(|term| term.round_off(u)).sum();
-        self.body.round_off(self.own(u)) + of_terms
-    }
-
     fn row_sums(&self) -> Vec<f64> {
         let mut sums = self.body.row_sums();
         for term in &self.terms {
             term.add_row_sums(&mut sums);
         }
         sums
-    }
-
-    fn contact_frequency_bound(&self) -> f64 {
-        let mass = self.body.mass();
-        let of_terms: f64 = self
-            .terms
-            .iter()
-            .map(|t| t.rate_bounds(mass).stiffness)
-            .sum();
-        self.body.contact_frequency_bound() + of_terms
-    }
-
-    fn drag_rate_bound(&self) -> f64 {
-        let mass = self.body.mass();
-        let of_terms: f64 = self.terms.iter().map(|t| t.rate_bounds(mass).drag).sum();
-        self.body.drag_rate_bound() + of_terms
     }
 
     fn tangent_is_constant(&self) -> Vec<bool> {
@@ -197,9 +198,39 @@ where
         })
     }
 
-    fn stored_energy(&self, u: &[f64]) -> f64 {
-        let of_terms: f64 = self.terms.iter().map(|term| term.energy(u)).sum();
-        self.body.stored_energy(self.own(u)) + of_terms
+    fn rows_that_expand(&self, sites: &[u32]) -> BlockCsr {
+        self.body.rows_that_expand(sites)
+    }
+
+    fn seam_sites(&self) -> Vec<u32> {
+        self.body.seam_sites()
+    }
+
+    fn symmetry(&self) -> Symmetry {
+        self.body.symmetry()
+    }
+
+    fn element_tangent(&self, u: &[f64], interval: Interval) -> Option<ElementTangent> {
+        let mut found = self.body.element_tangent(self.own(u), interval)?;
+        // own sites are no nodes; what is not linear is differenced
+        let end = found.excess.columns.len();
+        found.excess.row_offsets.resize(self.mass.len() + 1, end);
+        let is_linear = |t: &Arc<dyn ForceTerm + '_>| t.difference_length().is_none();
+        found.is_whole &= self.terms.iter().all(is_linear);
+        Some(found)
+    }
+}
+
+impl<S> BodyHistory for WithTerms<'_, S>
+where
+    S: DerefMut + Send + Sync,
+    S::Target: SemiDiscrete,
+{
+    fn commit(&mut self) {
+        self.body.commit();
+        if let Some((u, interval)) = self.last.as_ref().filter(|(u, _)| !u.is_empty()) {
+            self.terms.iter().for_each(|term| term.commit(u, *interval));
+        }
     }
 
     fn dissipation(&self) -> Option<Dissipation> {
@@ -260,6 +291,10 @@ where
         }
         fits
     }
+
+    fn body_state(&self) -> Option<&dyn BodyState> {
+        self.body.body_state()
+    }
 }
 
 #[cfg(test)]
@@ -267,7 +302,7 @@ mod tests {
     use std::sync::{Mutex, PoisonError};
 
     use super::*;
-    use crate::system::{LinearMotion, RateBounds, SpringRows};
+    use crate::system::{LinearMotion, SpringRows};
 
     /// A term that remembers the displacements of all intervals.
     #[derive(Default)]

@@ -7,7 +7,7 @@ use bondline::model::SiteKind;
 use bondline::peridynamics::bond_force::BondKinematics;
 use bondline::peridynamics::{Influence, Micromodulus};
 use bondline::system::BodyState;
-use bondline::system::{FailureUpdate, Interval, SemiDiscrete};
+use bondline::system::{BodyHistory, FailureUpdate, Interval, SemiDiscrete, Tangent};
 use bondline::tensor::Vector;
 use bondline_verify::enclosed::{Case, Cells, Enclosed, Law, Method, Widths};
 

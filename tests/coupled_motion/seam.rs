@@ -8,7 +8,7 @@ use bondline::system::BodyState;
 use bondline::{
     model::SiteKind,
     peridynamics::{Influence, Micromodulus, bond_force::BondKinematics},
-    system::{FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry},
+    system::{BodyHistory, FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry, Tangent},
     tensor::Vector,
 };
 use bondline_verify::{
@@ -206,7 +206,7 @@ fn a_broken_piece_takes_its_energy_and_the_elements_keep_theirs() {
             );
             motion.account_for_breaks(&Halfway::at(&u));
             let after = motion.stored_energy(&u);
-            let taken = motion.dissipated_energy().unwrap();
+            let taken = motion.dissipation().unwrap().total();
             assert!((before - after - taken).abs() < 1e-7 * taken, "{D}");
             // of the energy that bonds along x had, nothing is left: that of the elements, and of bonds across
             let damage = motion.damage().unwrap();
@@ -293,12 +293,12 @@ fn bodies_of_different_horizons_break_at_their_own_stretch() {
         let mut force = vec![0.0; 2 * model.sites.len()];
         for (strain, is_fine_broken) in [(0.01, false), (0.015, true)] {
             let u = stretched(strain);
-            let taken = motion.dissipated_energy().unwrap();
+            let taken = motion.dissipation().unwrap().total();
             let before = motion.stored_energy(&u);
             motion.internal_force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Update);
             motion.account_for_breaks(&Halfway::at(&u));
             let released = before - motion.stored_energy(&u);
-            let taken = motion.dissipated_energy().unwrap() - taken;
+            let taken = motion.dissipation().unwrap().total() - taken;
             assert!(
                 (released - taken).abs() < 1e-12 * taken,
                 "{released} {taken}"
@@ -396,7 +396,7 @@ fn crack_beside_the_seam(coupling: &str) -> Run {
         let lost = x.iter().zip(&damage).filter(|(_, d)| **d > 0.33);
         lost.map(|(x, _)| x[0]).fold(f64::NEG_INFINITY, f64::max)
     };
-    let taken = motion.dissipated_energy().unwrap();
+    let taken = motion.dissipation().unwrap().total();
     let start = tip(&motion);
     let mut u: Vec<f64> = x
         .iter()
@@ -424,7 +424,7 @@ fn crack_beside_the_seam(coupling: &str) -> Run {
         kick(&mut v, &force);
     }
     let kinetic: f64 = (0..v.len()).map(|d| 0.5 * mass[d / 2] * v[d] * v[d]).sum();
-    let end = motion.dissipated_energy().unwrap();
+    let end = motion.dissipation().unwrap().total();
     let damage = motion.damage().unwrap();
     let ahead = x.iter().zip(&damage).filter(|(x, _)| x[0] > 0.0);
     let (all, moment) = ahead.fold((0.0, 0.0), |(a, m), (x, d)| (a + d, m + d * x[1]));

@@ -11,7 +11,7 @@ use bondline::peridynamics::bond_force::{BondKinematics, Storage};
 use bondline::progress::Silent;
 use bondline::run::{AnyScene, setup};
 use bondline::scene::Source;
-use bondline::system::{FailureUpdate, Interval, Ranks, SemiDiscrete};
+use bondline::system::{BodyHistory, FailureUpdate, Interval, Ranks, SemiDiscrete, Tangent};
 
 use crate::threads::{alone, folder, on_processes, predicted};
 

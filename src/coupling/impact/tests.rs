@@ -1,5 +1,7 @@
 use super::*;
-use crate::system::{FailureUpdate, Interval, LinearMotion, SemiDiscrete, Symmetry, WithTerms};
+use crate::system::{
+    FailureUpdate, Interval, LinearMotion, SemiDiscrete, Symmetry, Tangent, WithTerms,
+};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -225,7 +227,7 @@ fn the_frequency_bound_holds_and_is_not_far_off() {
         symmetry: Symmetry::Symmetric,
     };
     let mut system = WithTerms::new(Box::new(body), vec![Arc::new(contact) as _]);
-    let bound = system.contact_frequency_bound();
+    let bound = system.rate_bounds().stiffness;
     let found = largest_eigenvalue(&mut system, &[0.0; 61 * 3]);
     assert!(found <= bound, "{found} {bound}");
     assert!(found > 0.8 * bound, "{found} {bound}");

@@ -5,7 +5,7 @@ use super::behaviour::NONE;
 use crate::{peridynamics::bond_force::BondKinematics, system::PlaceStress};
 
 impl<const D: usize> CoupledSystem<'_, D> {
-    /// See [`crate::system::SemiDiscrete::stress_of_site`].
+    /// See [`crate::system::BodyState::stress_of_site`].
     pub(super) fn stress_of_point(&self, site: usize, u: &[f64]) -> Option<PlaceStress> {
         let moving = self.body.as_ref()?;
         let states = moving.pass.force_states()?;
@@ -23,7 +23,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
         })
     }
 
-    /// See [`crate::system::SemiDiscrete::energy_densities`].
+    /// See [`crate::system::BodyState::energy_densities`].
     pub(super) fn energy_densities_of_points(&self, u: &[f64]) -> Option<Vec<f64>> {
         let moving = self.body.as_ref()?;
         let states = moving.pass.force_states()?;
@@ -38,7 +38,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
         Some(sites)
     }
 
-    /// See [`crate::system::SemiDiscrete::points_without_response`].
+    /// See [`crate::system::BodyState::points_without_response`].
     pub(super) fn count_without_response(&self, u: &[f64]) -> usize {
         let Some(body) = &self.body else {
             return 0;
@@ -51,7 +51,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
         states.points_without_response(&points)
     }
 
-    /// See [`crate::system::SemiDiscrete::remembered`].
+    /// See [`crate::system::BodyState::remembered`].
     pub(super) fn remembered_by_points(&self) -> Vec<(&'static str, Vec<f64>)> {
         let Some(body) = &self.body else {
             return Vec::new();

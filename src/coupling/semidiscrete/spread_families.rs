@@ -22,7 +22,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
         }
     }
 
-    /// See [`crate::system::SemiDiscrete::tangent_rows`]. Collective where families are spread.
+    /// See [`crate::system::Tangent::tangent_rows`]. Collective where families are spread.
     pub(super) fn rows_at(&self, sites: &[u32]) -> BlockCsr {
         match self.spread_families() {
             Some(spread) => spread.gather_rows(sites, |own| self.own_rows_at(own)),
@@ -71,7 +71,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
         })
     }
 
-    /// See [`crate::system::SemiDiscrete::broken_bonds`]. Collective where families are spread.
+    /// See [`crate::system::BodyState::broken_bonds`]. Collective where families are spread.
     pub(super) fn broken_between_sites(&self) -> Vec<(u32, u32)> {
         let held = self.broken_of_held_families();
         let Some(spread) = self.spread_families() else {

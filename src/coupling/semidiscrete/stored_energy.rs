@@ -5,7 +5,7 @@ use std::sync::PoisonError;
 use super::{CoupledSystem, behaviour::CHUNK, body::MovingBody};
 use crate::{
     parallel,
-    system::{SemiDiscrete, Symmetry},
+    system::{Symmetry, Tangent},
     tensor::Vector,
 };
 

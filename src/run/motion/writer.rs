@@ -233,7 +233,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
     fn dissipated(&self, system: &dyn SemiDiscrete) -> f64 {
         match self.breaks {
             Breaks::Possibly | Breaks::Gradually | Breaks::Dissipating => {
-                system.dissipated_energy().unwrap_or(0.0)
+                system.dissipation().map_or(0.0, |d| d.total())
             }
             Breaks::Never => 0.0,
         }

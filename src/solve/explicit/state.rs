@@ -42,7 +42,7 @@ impl Drive for Undriven {
     }
 }
 
-/// All that changes in a motion, but for the damage, which the system keeps ([`SemiDiscrete::damage_state`]): both together resume a run bit for bit.
+/// All that changes in a motion, but for the damage, which the system keeps ([`BodyHistory::damage_state`](crate::system::BodyHistory::damage_state)): both together resume a run bit for bit.
 ///
 /// Shapes: one entry per dof. Units: \[s\], \[m\], \[m/s\], \[m/s²\], \[J\].
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -18,7 +18,9 @@ use bondline::peridynamics::Micromodulus;
 use bondline::peridynamics::bond_force::BondKinematics;
 use bondline::progress::{Progress, Silent};
 use bondline::solve::statics::{self, StaticParams, StaticProblem};
-use bondline::system::{BodyState, FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry};
+use bondline::system::{
+    BodyHistory, BodyState, FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry,
+};
 use bondline::tensor::{Vector, padded};
 use bondline::{coupling::BlendingFunction, model::FitDegree};
 
@@ -264,7 +266,7 @@ fn run_crack(
         }
     }
     let kinetic: f64 = (0..v.len()).map(|d| 0.5 * mass[d / 2] * v[d] * v[d]).sum();
-    let taken = motion.dissipated_energy().unwrap_or(0.0);
+    let taken = motion.dissipation().map_or(0.0, |d| d.total());
     let damage = motion.damage().unwrap_or_default();
     let longer = [0.5, -0.5].map(|side| {
         let row = damage_beside(&x, y, &damage, side);
