@@ -7,8 +7,9 @@ use crate::{
     },
     dimension,
     mesh::Mesh,
-    model::{CellRole, Interface, Model, ModelError, Zone, ZoneLayout},
-    peridynamics::PdBody,
+    model::{CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout},
+    peridynamics::{LinearForceState, PdBody},
+    system::Symmetry,
 };
 
 /// Half of a splice's rows and half of a blending's, with a step in β at the edge of the nonlocal zone.
@@ -35,12 +36,20 @@ impl<const D: usize> ZoneLayout<D> for Balanced {
         Interface::Overlap
     }
 
+    fn symmetry(&self) -> Symmetry {
+        Symmetry::Unsymmetric
+    }
+
     fn roles(&self, mesh: &Mesh<D>, zones: &[Zone], largest_horizon: f64) -> Vec<CellRole> {
         let outermost = match self.function {
             Some(_) => Zone::Transition,
             None => Zone::Nonlocal,
         };
         blending::with_collar(mesh, zones, outermost, largest_horizon * blending::CLOSED)
+    }
+
+    fn reach(&self, law: &dyn LinearForceState<D>) -> Reach {
+        Reach::of_bond_forces(law)
     }
 
     fn takes_deviators(&self) -> bool {

@@ -2,17 +2,20 @@
 
 use crate::{
     assembly::Row,
-    coupling::{Coupling, ExactStresses, MixedRows, Operator, Rows, SeamBonds},
+    coupling::{
+        CellStresses, Coupling, Definiteness, ExactStresses, MixedRows, Operator, Rows, SeamBonds,
+    },
     dimension,
     mesh::Mesh,
     model::{
-        CellRole, Interface, Model, ModelError, Zone, ZoneLayout,
+        CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout,
         held_families::depth_of_seam,
         least_squares_gradient::{self, DerivativeWeights},
         zone_distance::Edge,
     },
     parallel,
     peridynamics::{LinearForceState, PdBody},
+    system::Symmetry,
     tensor::{Tensor, Vector},
 };
 
@@ -64,6 +67,10 @@ impl<const D: usize> ZoneLayout<D> for Blending {
         Interface::Overlap
     }
 
+    fn symmetry(&self) -> Symmetry {
+        Symmetry::Unsymmetric
+    }
+
     fn roles(&self, mesh: &Mesh<D>, zones: &[Zone], largest_horizon: f64) -> Vec<CellRole> {
         match self.function {
             BlendingFunction::Constant => {
@@ -71,6 +78,10 @@ impl<const D: usize> ZoneLayout<D> for Blending {
             }
             _ => with_collar(mesh, zones, Zone::Transition, largest_horizon * OPEN),
         }
+    }
+
+    fn reach(&self, law: &dyn LinearForceState<D>) -> Reach {
+        Reach::of_bond_forces(law)
     }
 
     fn takes_deviators(&self) -> bool {
@@ -270,6 +281,18 @@ impl<const D: usize> Operator<D> for Blended<'_, D> {
 
     fn beta(&self, site: usize) -> f64 {
         self.model.point_of(site).map_or(0.0, |(_, i)| self.beta[i])
+    }
+
+    fn definiteness(&self) -> Definiteness {
+        Definiteness::SumOfSquares
+    }
+
+    fn additional_bonds(&self) -> usize {
+        0
+    }
+
+    fn cell_stresses(&self) -> Option<&dyn CellStresses<D>> {
+        None
     }
 }
 

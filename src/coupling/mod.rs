@@ -63,6 +63,7 @@ pub use uncoupled::{Local, Nonlocal};
 use crate::{
     assembly::Row,
     model::{Model, ModelError, ZoneLayout},
+    tensor::Tensor,
 };
 
 /// A method that couples both regions.
@@ -101,6 +102,17 @@ pub trait MixedRows<const D: usize>: Sync {
     fn add_row_beside_bonds(&self, site: usize, row: &mut Row<D>);
 }
 
+/// Stresses of cells that are partial stresses at their Gauss points.
+pub trait CellStresses<const D: usize>: Sync {
+    /// The mean partial stress of a cell; none of a cell whose stress is that of its own law.
+    fn cell_stress(&self, cell: usize, u: &[f64]) -> Option<Tensor<D>>;
+
+    /// The sum of [`CellStresses::cell_stress`] over cells, for displacements that have one component: entry `[f][c]` is that of `u_c` = field `f`, the others zero.
+    ///
+    /// Shapes: each field has one number per site. One pass over the families does for all fields.
+    fn sums_of_cell_stress(&self, cells: &[usize], fields: &[Vec<f64>]) -> Vec<[Tensor<D>; D]>;
+}
+
 /// Adds to the row of a site.
 pub type AddRow<'a, const D: usize> = dyn Fn(usize, &mut Row<D>) + Sync + 'a;
 
@@ -112,7 +124,7 @@ pub struct SeamBonds<'a, const D: usize> {
     pub add_rest: Box<AddRow<'a, D>>,
 }
 
-/// The rows of a coupled model.
+/// The rows of a coupled model. Every method is required: rows without bonds of a seam say so.
 pub trait Operator<const D: usize>: Sync {
     /// Adds the internal force of a site, times −1 (`K u = f`).
     fn add_row(&self, site: usize, row: &mut Row<D>);
@@ -135,29 +147,12 @@ pub trait Operator<const D: usize>: Sync {
     /// The partial stresses that rows of sites have, where the operator has such: of geometrically exact bonds a nonlinear system adds what is not linear in them.
     fn exact_stresses(&self) -> Option<ExactStresses<D>>;
 
-    /// Returns the evidence that the energy behind symmetric rows is never negative.
-    fn definiteness(&self) -> Definiteness {
-        Definiteness::SumOfSquares
-    }
+    /// Returns the evidence that the energy behind symmetric rows is never negative. Rows that are not symmetric have no such energy, and no run relies on what they say here.
+    fn definiteness(&self) -> Definiteness;
 
     /// Number of directed bonds that the method adds to those of the peridynamic body (Gauss points).
-    fn additional_bonds(&self) -> usize {
-        0
-    }
+    fn additional_bonds(&self) -> usize;
 
-    /// The mean partial stress of a cell whose stress is the partial stress at its Gauss points.
-    fn cell_stress(&self, _cell: usize, _u: &[f64]) -> Option<crate::tensor::Tensor<D>> {
-        None
-    }
-
-    /// The sum of [`Operator::cell_stress`] over cells, for displacements that have one component: entry `[f][c]` is that of `u_c` = field `f`, the others zero.
-    ///
-    /// Shapes: each field has one number per site; empty where no cell has such a stress. One pass over the families does for all fields.
-    fn sums_of_cell_stress(
-        &self,
-        _cells: &[usize],
-        _fields: &[Vec<f64>],
-    ) -> Vec<[crate::tensor::Tensor<D>; D]> {
-        Vec::new()
-    }
+    /// The stresses of cells that follow the partial stress of bonds, where the operator has such cells.
+    fn cell_stresses(&self) -> Option<&dyn CellStresses<D>>;
 }

@@ -2,7 +2,9 @@
 
 use crate::{
     assembly::Row,
-    coupling::{Coupling, ExactStresses, MixedRows, Operator, Rows, SeamBonds},
+    coupling::{
+        CellStresses, Coupling, Definiteness, ExactStresses, MixedRows, Operator, Rows, SeamBonds,
+    },
     dimension,
     mesh::Mesh,
     model::{
@@ -11,6 +13,7 @@ use crate::{
     },
     parallel,
     peridynamics::{Influence, LinearForceState, PdBody},
+    system::Symmetry,
     tensor::{Tensor, Vector},
 };
 
@@ -42,6 +45,10 @@ impl<const D: usize> ZoneLayout<D> for PartialStressMeshfree {
 
     fn interface(&self) -> Interface {
         Interface::Overlap
+    }
+
+    fn symmetry(&self) -> Symmetry {
+        Symmetry::Unsymmetric
     }
 
     fn roles(&self, _mesh: &Mesh<D>, zones: &[Zone], _largest_horizon: f64) -> Vec<CellRole> {
@@ -167,6 +174,18 @@ impl<const D: usize> Operator<D> for Meshfree<'_, D> {
             _ => Vec::new(),
         };
         ExactStresses::new(self.model, None, of_site, |_| Vec::new())
+    }
+
+    fn definiteness(&self) -> Definiteness {
+        Definiteness::SumOfSquares
+    }
+
+    fn additional_bonds(&self) -> usize {
+        0
+    }
+
+    fn cell_stresses(&self) -> Option<&dyn CellStresses<D>> {
+        None
     }
 }
 

@@ -5,16 +5,19 @@ use std::sync::Arc;
 use crate::coupling::partial_stress_fit::{FamilyFit, shapes};
 use crate::{
     assembly::Row,
-    coupling::{Coupling, ExactStresses, MixedRows, Operator, Rows, SeamBonds},
+    coupling::{
+        CellStresses, Coupling, Definiteness, ExactStresses, MixedRows, Operator, Rows, SeamBonds,
+    },
     dimension,
     fem::{self, QuadraturePoint},
     mesh::Mesh,
-    model::{CellRole, FitDegree, Interface, Model, ModelError, Zone, ZoneLayout},
+    model::{CellRole, FitDegree, Interface, Model, ModelError, Reach, Zone, ZoneLayout},
     parallel,
     peridynamics::{
-        Cloud, Ends, Factors, Families, PdBody, PdError, TIE_TOLERANCE,
+        Cloud, Ends, Factors, Families, LinearForceState, PdBody, PdError, TIE_TOLERANCE,
         alike::{self},
     },
+    system::Symmetry,
     tensor::{Tensor, Vector},
 };
 
@@ -37,6 +40,10 @@ impl<const D: usize> ZoneLayout<D> for PartialStressElements {
         "partial stress (elements)"
     }
 
+    fn symmetry(&self) -> Symmetry {
+        Symmetry::Unsymmetric
+    }
+
     fn roles(&self, _mesh: &Mesh<D>, zones: &[Zone], _largest_horizon: f64) -> Vec<CellRole> {
         zones
             .iter()
@@ -50,6 +57,10 @@ impl<const D: usize> ZoneLayout<D> for PartialStressElements {
 
     fn interface(&self) -> Interface {
         Interface::Constrained(self.fit)
+    }
+
+    fn reach(&self, law: &dyn LinearForceState<D>) -> Reach {
+        Reach::of_bond_forces(law)
     }
 
     fn takes_deviators(&self) -> bool {
@@ -272,10 +283,20 @@ impl<const D: usize> Operator<D> for Elements<'_, D> {
         }
     }
 
+    fn definiteness(&self) -> Definiteness {
+        Definiteness::SumOfSquares
+    }
+
     fn additional_bonds(&self) -> usize {
         self.body.bond_count()
     }
 
+    fn cell_stresses(&self) -> Option<&dyn CellStresses<D>> {
+        Some(self)
+    }
+}
+
+impl<const D: usize> CellStresses<D> for Elements<'_, D> {
     fn cell_stress(&self, cell: usize, u: &[f64]) -> Option<Tensor<D>> {
         if self.first[cell] == u32::MAX {
             return None;

@@ -4,9 +4,11 @@ use crate::{
     coupling::{Coupling, Operator, uncoupled::own_model},
     mesh::Mesh,
     model::{
-        CellRole, Interface, Model, ModelError, Zone, ZoneLayout, held_families::depth_of_seam,
+        CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout,
+        held_families::depth_of_seam,
     },
     peridynamics::LinearForceState,
+    system::Symmetry,
 };
 
 /// The splice of a local and a peridynamic region.
@@ -26,6 +28,10 @@ impl<const D: usize> ZoneLayout<D> for Splice {
         Interface::Overlap
     }
 
+    fn symmetry(&self) -> Symmetry {
+        Symmetry::Unsymmetric
+    }
+
     fn roles(&self, _mesh: &Mesh<D>, zones: &[Zone], _largest_horizon: f64) -> Vec<CellRole> {
         zones
             .iter()
@@ -34,6 +40,10 @@ impl<const D: usize> ZoneLayout<D> for Splice {
                 Zone::Transition | Zone::Local => CellRole::Element,
             })
             .collect()
+    }
+
+    fn reach(&self, law: &dyn LinearForceState<D>) -> Reach {
+        Reach::of_bond_forces(law)
     }
 
     fn takes_deviators(&self) -> bool {

@@ -2,10 +2,12 @@
 
 use crate::{
     assembly::Row,
-    coupling::{Coupling, ExactStresses, MixedRows, Operator, SeamBonds},
+    coupling::{
+        CellStresses, Coupling, Definiteness, ExactStresses, MixedRows, Operator, SeamBonds,
+    },
     dimension,
     mesh::Mesh,
-    model::{CellRole, Interface, Model, ModelError, Zone, ZoneLayout},
+    model::{CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout},
     peridynamics::LinearForceState,
     system::Symmetry,
 };
@@ -35,6 +37,10 @@ impl<const D: usize> ZoneLayout<D> for Local {
         vec![CellRole::Element; mesh.cell_count()]
     }
 
+    fn reach(&self, law: &dyn LinearForceState<D>) -> Reach {
+        Reach::of_bond_forces(law)
+    }
+
     fn takes_deviators(&self) -> bool {
         true
     }
@@ -61,6 +67,10 @@ impl<const D: usize> ZoneLayout<D> for Nonlocal {
 
     fn roles(&self, mesh: &Mesh<D>, _zones: &[Zone], _largest_horizon: f64) -> Vec<CellRole> {
         vec![CellRole::Points; mesh.cell_count()]
+    }
+
+    fn reach(&self, law: &dyn LinearForceState<D>) -> Reach {
+        Reach::of_bond_forces(law)
     }
 
     fn takes_deviators(&self) -> bool {
@@ -128,5 +138,17 @@ impl<const D: usize> Operator<D> for OwnModel<'_, D> {
 
     fn beta(&self, site: usize) -> f64 {
         f64::from(u8::from(self.model.point_of(site).is_some()))
+    }
+
+    fn definiteness(&self) -> Definiteness {
+        Definiteness::SumOfSquares
+    }
+
+    fn additional_bonds(&self) -> usize {
+        0
+    }
+
+    fn cell_stresses(&self) -> Option<&dyn CellStresses<D>> {
+        None
     }
 }

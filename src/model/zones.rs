@@ -37,6 +37,17 @@ pub enum Reach {
     Neighbours,
 }
 
+impl Reach {
+    /// The extent that forces of bonds ask for: the force states of both ends enter them, which are more than the bond only where a law has a state.
+    pub fn of_bond_forces<const D: usize>(law: &dyn LinearForceState<D>) -> Self {
+        if law.is_pairwise() {
+            Self::Own
+        } else {
+            Self::Neighbours
+        }
+    }
+}
+
 /// Which nodes of finite elements at the seam are sites, and which follow the sites around them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interface {
@@ -56,21 +67,13 @@ pub trait ZoneLayout<const D: usize>: Send + Sync {
     fn name(&self) -> &'static str;
 
     /// Returns the symmetry of the stiffness.
-    fn symmetry(&self) -> Symmetry {
-        Symmetry::Unsymmetric
-    }
+    fn symmetry(&self) -> Symmetry;
 
     /// Returns the role of each cell, given the zones that the scene asks for.
     fn roles(&self, mesh: &Mesh<D>, zones: &[Zone], largest_horizon: f64) -> Vec<CellRole>;
 
-    /// Returns the extent to which families have to be complete.
-    fn reach(&self, law: &dyn LinearForceState<D>) -> Reach {
-        if law.is_pairwise() {
-            Reach::Own
-        } else {
-            Reach::Neighbours
-        }
-    }
+    /// Returns the extent to which families have to be complete; [`Reach::of_bond_forces`] for rows that are the forces of bonds.
+    fn reach(&self, law: &dyn LinearForceState<D>) -> Reach;
 
     /// Returns the depth, in families from the elements, within which every process needs the families of all points; elsewhere it may hold those of its own alone. None if that is not known.
     ///

@@ -57,7 +57,9 @@ use crate::coupling::truncated::{
 };
 use crate::{
     assembly::Row,
-    coupling::{Coupling, Definiteness, ExactStresses, MixedRows, Operator, Rows, SeamBonds},
+    coupling::{
+        CellStresses, Coupling, Definiteness, ExactStresses, MixedRows, Operator, Rows, SeamBonds,
+    },
     dimension,
     mesh::Mesh,
     model::{
@@ -319,6 +321,14 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
 
     fn beta(&self, site: usize) -> f64 {
         f64::from(u8::from(self.model.point_of(site).is_some()))
+    }
+
+    fn additional_bonds(&self) -> usize {
+        0
+    }
+
+    fn cell_stresses(&self) -> Option<&dyn CellStresses<D>> {
+        None
     }
 }
 

@@ -6,7 +6,9 @@ use crate::mesh::Mesh;
 use crate::peridynamics::LinearForceState;
 use crate::system::Symmetry;
 use crate::{
-    coupling::{Coupling, ExactStresses, MixedRows, Operator, Rows, SeamBonds},
+    coupling::{
+        CellStresses, Coupling, Definiteness, ExactStresses, MixedRows, Operator, Rows, SeamBonds,
+    },
     model::{CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout},
 };
 
@@ -113,6 +115,18 @@ impl<const D: usize> Operator<D> for FamilyRows<'_, D> {
 
     fn beta(&self, site: usize) -> f64 {
         f64::from(u8::from(self.is_body_row(site)))
+    }
+
+    fn definiteness(&self) -> Definiteness {
+        Definiteness::SumOfSquares
+    }
+
+    fn additional_bonds(&self) -> usize {
+        0
+    }
+
+    fn cell_stresses(&self) -> Option<&dyn CellStresses<D>> {
+        None
     }
 }
 

@@ -331,6 +331,10 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
         .collect()
     }
 
+    fn drag_rate(&self, _mass: &dyn Fn(usize) -> f64) -> f64 {
+        0.0
+    }
+
     fn add_lost_energy(&self, at: &dyn Fn(usize) -> [f64; D], lost: &mut ExactSum) {
         match self.kinematics {
             BondKinematics::Exact => self.lost::<true>(at, lost),
@@ -386,6 +390,10 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
 
     fn own_points(&mut self) -> Option<&mut dyn super::OwnPoints> {
         Some(self)
+    }
+
+    fn heated(&mut self) -> Option<&mut dyn super::HeatedBonds> {
+        None
     }
 
     fn force_states(&self) -> Option<&dyn super::ForceStates<D>> {

@@ -144,9 +144,7 @@ pub trait BondPass<const D: usize>: Send + Sync {
     fn last_broken(&self) -> Vec<(u32, u32)>;
 
     /// An upper bound on the eigenvalues of `M⁻¹ C` of forces `C v` against velocities, with the mass of each point \[1/s\].
-    fn drag_rate(&self, _mass: &dyn Fn(usize) -> f64) -> f64 {
-        0.0
-    }
+    fn drag_rate(&self, mass: &dyn Fn(usize) -> f64) -> f64;
 
     /// Adds to `lost`, point by point, what the points with rows would store less at the displacement `at` of each point, for the bonds that the last pass broke:
     /// their energy before less that after, all of these bonds removed at once \[J\]. Of a state-based law that is the change of dilatations too.
@@ -172,9 +170,7 @@ pub trait BondPass<const D: usize>: Send + Sync {
     fn own_points(&mut self) -> Option<&mut dyn OwnPoints>;
 
     /// The pass as one whose bonds know a temperature; none of an accelerator.
-    fn heated(&mut self) -> Option<&mut dyn HeatedBonds> {
-        None
-    }
+    fn heated(&mut self) -> Option<&mut dyn HeatedBonds>;
 
     /// The force states that it computes one by one, for queries of them; none of an accelerator.
     fn force_states(&self) -> Option<&dyn ForceStates<D>>;

@@ -354,9 +354,11 @@ fn largest<const D: usize>(
     }
     cells.sort_unstable();
     cells.dedup();
+    let of_bonds = around.operator.cell_stresses();
     for c in cells.into_iter().filter(|&c| model.is_element(c)) {
         let node = |n: usize| model.node_transfer.displacement::<D>(n, u);
-        let stress = around.operator.cell_stress(c, u).unwrap_or_else(|| {
+        let of_bonds = of_bonds.and_then(|stresses| stresses.cell_stress(c, u));
+        let stress = of_bonds.unwrap_or_else(|| {
             let g = fem::displacement_gradient_at_centre(&model.mesh, c, node);
             model.tensor_of_cell(c).contract(&g)
         });
