@@ -33,7 +33,7 @@ impl<const D: usize> ZoneLayout<D> for Balanced {
     }
 
     fn interface(&self) -> Interface {
-        Interface::Overlap
+        Interface::OVERLAP
     }
 
     fn symmetry(&self) -> Symmetry {

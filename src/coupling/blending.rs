@@ -64,7 +64,7 @@ impl<const D: usize> ZoneLayout<D> for Blending {
     }
 
     fn interface(&self) -> Interface {
-        Interface::Overlap
+        Interface::OVERLAP
     }
 
     fn symmetry(&self) -> Symmetry {

@@ -44,7 +44,7 @@ impl<const D: usize> ZoneLayout<D> for PartialStressMeshfree {
     }
 
     fn interface(&self) -> Interface {
-        Interface::Overlap
+        Interface::OVERLAP
     }
 
     fn symmetry(&self) -> Symmetry {

@@ -56,7 +56,7 @@ impl<const D: usize> ZoneLayout<D> for PartialStressElements {
     }
 
     fn interface(&self) -> Interface {
-        Interface::Constrained(self.fit)
+        Interface::constrained(self.fit)
     }
 
     fn reach(&self, law: &dyn LinearForceState<D>) -> Reach {

@@ -13,7 +13,16 @@ use crate::{
 impl<const D: usize> Model<D> {
     /// Adds the finite-element row of a node: all cells around it but those whose stress is a partial stress.
     pub fn add_element_rows(&self, site: usize, row: &mut Row<D>) {
-        let takes = |c: usize| self.roles[c] != CellRole::StressElement && self.node_takes(c);
+        self.add_rows_of_elements(site, |c| self.node_takes(c), row);
+    }
+
+    /// Adds the finite-element row of a node, of the elements around it that overlap with no points.
+    pub fn add_rows_of_own_elements(&self, site: usize, row: &mut Row<D>) {
+        self.add_rows_of_elements(site, |c| self.is_element(c), row);
+    }
+
+    fn add_rows_of_elements(&self, site: usize, of: impl Fn(usize) -> bool, row: &mut Row<D>) {
+        let takes = |c: usize| self.roles[c] != CellRole::StressElement && of(c);
         for (c, local) in self.cells_of_site(site).filter(|(c, _)| takes(*c)) {
             self.add_element_row(c, local, 1.0, row);
         }

@@ -25,7 +25,7 @@ impl<const D: usize> ZoneLayout<D> for Splice {
     }
 
     fn interface(&self) -> Interface {
-        Interface::Overlap
+        Interface::OVERLAP
     }
 
     fn symmetry(&self) -> Symmetry {

@@ -26,7 +26,7 @@ impl<const D: usize> ZoneLayout<D> for Local {
     }
 
     fn interface(&self) -> Interface {
-        Interface::Overlap
+        Interface::OVERLAP
     }
 
     fn symmetry(&self) -> Symmetry {
@@ -58,7 +58,7 @@ impl<const D: usize> ZoneLayout<D> for Nonlocal {
     }
 
     fn interface(&self) -> Interface {
-        Interface::Overlap
+        Interface::OVERLAP
     }
 
     fn symmetry(&self) -> Symmetry {

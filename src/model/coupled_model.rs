@@ -48,7 +48,7 @@ pub struct Model<const D: usize> {
     pub(crate) node_cells: (Vec<u32>, Vec<u32>),
     /// Nodes in the middle of edges that follow the ends of their edge.
     pub(crate) ties: Ties,
-    /// Treatment of nodes at the seam.
+    /// Places at the seam.
     pub(crate) interface: Interface,
     /// True if rows are the gradient of an energy.
     pub(crate) has_energy: bool,
@@ -263,12 +263,12 @@ impl<const D: usize> Model<D> {
 
     /// Returns true if the rows and loads of the nodes around a cell contain its share: where elements overlap into the peridynamic region, those of all cells do.
     pub fn node_takes(&self, cell: usize) -> bool {
-        !self.faces_cut_bonds() || self.is_element(cell)
+        self.interface.overlap || self.is_element(cell)
     }
 
-    /// Returns true if bonds end on the faces of elements, so that no place beyond acts on a point.
+    /// Returns true if bonds end on the faces of elements.
     pub fn faces_cut_bonds(&self) -> bool {
-        matches!(self.interface, Interface::Faces | Interface::Feet)
+        self.interface.faces || self.interface.feet
     }
 
     /// The lattice behind the faces at which bonds end, if they do.

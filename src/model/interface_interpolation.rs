@@ -30,9 +30,9 @@ pub(crate) struct Sites<'a, const D: usize> {
 /// Nodes of the cells at the seam that are no sites.
 fn nodes_to_fit<const D: usize>(at: &Sites<'_, D>, interface: Interface) -> Vec<bool> {
     let mut wanted = vec![false; at.mesh.nodes.len()];
-    let cells = match interface {
-        Interface::Faces | Interface::Feet => 0,
-        _ => at.mesh.cell_count(),
+    let cells = match interface.overlap {
+        true => at.mesh.cell_count(),
+        false => 0,
     };
     for c in 0..cells {
         let cell = at.mesh.cell(c);
@@ -53,10 +53,8 @@ pub(crate) fn fit_nodes<const D: usize>(
     cloud: &PointCloud<D>,
 ) -> Result<Transfer, ModelError> {
     let wanted = nodes_to_fit(at, interface);
-    let (degree, with_nodes) = match interface {
-        Interface::Overlap | Interface::Faces | Interface::Feet => (FitDegree::Quadratic, false),
-        Interface::Constrained(degree) => (degree, true),
-    };
+    let with_nodes = interface.constrained.is_some();
+    let degree = interface.constrained.unwrap_or(FitDegree::Quadratic);
     let largest = cloud.horizon.largest();
     let data: Vec<(u32, Vector<D>)> = (0..at.sites.len() as u32)
         .map(|s| (s, at.sites[s as usize].position))

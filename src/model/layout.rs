@@ -6,8 +6,7 @@ use crate::{
     assembly::Transfer,
     dimension,
     model::{
-        CellRole, Interface, Model, ModelError, Peridynamics, Reach, Tributary, ZoneLayout,
-        ZonedBody,
+        CellRole, Model, ModelError, Peridynamics, Reach, Tributary, ZoneLayout, ZonedBody,
         bond_cutting::LatticeFactors,
         completed_lattice::CompletedLattice,
         continued_lattice::ContinuedLattice,
@@ -121,19 +120,15 @@ impl<const D: usize> Model<D> {
     fn place_clouds(&self, coupling: &dyn ZoneLayout<D>) -> Result<Vec<PointCloud<D>>, ModelError> {
         match &self.peridynamics {
             Some(p) if self.roles.contains(&CellRole::Points) => {
-                let beyond = match self.interface {
-                    Interface::Faces => Beyond::Continued,
-                    Interface::Overlap | Interface::Constrained(_) | Interface::Feet => {
-                        Beyond::Empty
-                    }
+                let beyond = match self.interface.faces {
+                    true => Beyond::Continued,
+                    false => Beyond::Empty,
                 };
                 self.check_lattices(p)?;
                 // feet stand for what the whole lattice has beyond a face
-                let reach = match self.interface {
-                    Interface::Feet => Reach::Neighbours,
-                    Interface::Overlap | Interface::Constrained(_) | Interface::Faces => {
-                        reach(coupling, p)
-                    }
+                let reach = match self.interface.feet {
+                    true => Reach::Neighbours,
+                    false => reach(coupling, p),
                 };
                 let (mesh, zones) = (&self.mesh, &self.zones);
                 point_generation::place(mesh, zones, &self.roles, p, reach, beyond)
@@ -174,16 +169,14 @@ impl<const D: usize> Model<D> {
             [alone] => HeldFamilies::of(coupling, p, reach, alone.spacing),
             _ => None,
         };
-        let grow = |(l, cloud): (usize, PointCloud<D>)| match self.interface {
-            Interface::Feet => {
+        let grow = |(l, cloud): (usize, PointCloud<D>)| match self.interface.feet {
+            true => {
                 let whole = self.grow(p, cloud, l, Reach::Neighbours, (None, None))?;
                 let (lattice, ends) = family_ends::place((&self.mesh, &self.roles), p, whole)?;
                 feet = Some(ends);
                 Ok(lattice)
             }
-            Interface::Overlap | Interface::Constrained(_) | Interface::Faces => {
-                self.grow(p, cloud, l, reach, (held, ranks))
-            }
+            false => self.grow(p, cloud, l, reach, (held, ranks)),
         };
         let grown: Result<Vec<_>, ModelError> = clouds.into_iter().enumerate().map(grow).collect();
         Ok((grown?, feet))

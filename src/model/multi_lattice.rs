@@ -175,13 +175,13 @@ impl<const D: usize> Model<D> {
         } else {
             Reach::Neighbours
         };
-        let (keep, passing) = match self.interface {
-            Interface::Faces => {
-                let (keep, passing) = cloud.prune_through(&families);
+        let (keep, passing) = match self.interface.faces {
+            true => {
+                let (keep, passing) = cloud.prune_through(&families, reach);
                 let families = families.restrict(&keep.renumbered, &passing);
                 (keep, Some(families))
             }
-            _ => (cloud.prune(&families, reach), None),
+            false => (cloud.prune(&families, reach), None),
         };
         let families = families.restrict(&keep.renumbered, &keep.active);
         let wide = self
@@ -196,7 +196,7 @@ impl<const D: usize> Model<D> {
         }
         cloud.retain(&keep.renumbered);
         // bonds that are cut where elements begin see nothing of what lies beyond
-        if !self.faces_cut_bonds() {
+        if self.interface.overlap {
             self.check_materials(p.law.as_ref(), &cloud, |_| true)?;
         }
         Ok(CompletedLattice {
@@ -213,15 +213,15 @@ impl<const D: usize> Model<D> {
 
     /// The facets of the mesh that cut bonds of a lattice, if any do.
     fn cutting_surface(&self, p: &Peridynamics<D>, lattice: usize) -> Option<Vec<BoundaryFacet>> {
-        match (self.interface, p.surfaces) {
+        match (self.faces_cut_bonds(), p.surfaces) {
             // a bond may leave the body through the elements around, but not through a free surface of the points
-            (Interface::Faces | Interface::Feet, _) => {
+            (true, _) => {
                 let mut facets = self.mesh.outer_facets();
                 facets.retain(|f| self.lattice_in(&p.points, f.cell as usize) == Some(lattice));
                 Some(facets)
             }
-            (_, Surfaces::Cut) => Some(self.mesh.outer_facets()),
-            (_, Surfaces::Uncut) => None,
+            (false, Surfaces::Cut) => Some(self.mesh.outer_facets()),
+            (false, Surfaces::Uncut) => None,
         }
     }
 
@@ -282,7 +282,7 @@ impl<const D: usize> Model<D> {
         let PointSource::Lattices { lattices, .. } = &p.points else {
             return Ok(());
         };
-        if self.interface != Interface::Faces {
+        if self.interface != Interface::FACES {
             return Err(ModelError::Unsupported {
                 what: "several lattices with a coupling that completes families across the seam",
                 remedy: "use coupling.truncated, or one lattice",

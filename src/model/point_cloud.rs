@@ -87,8 +87,8 @@ impl<const D: usize> PointCloud<D> {
     /// Keeps also the points from which a bond may pass through the peridynamic region without ending in it, and tells which these are.
     ///
     /// Such a point lies within a horizon of the region, and some site within a cell's diagonal of it.
-    pub fn prune_through(&self, families: &Families) -> (Kept, Vec<bool>) {
-        let kept = self.prune(families, Reach::Own);
+    pub fn prune_through(&self, families: &Families, reach: Reach) -> (Kept, Vec<bool>) {
+        let kept = self.prune(families, reach);
         let largest = self.horizon.largest();
         let size = largest + 2.0 * self.spacing * (D as f64).sqrt();
         let bin =

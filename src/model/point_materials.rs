@@ -59,7 +59,7 @@ impl<const D: usize> Model<D> {
         };
         let found = parallel::map(cloud.position.len(), 1, |i| match &cloud.element[i] {
             None => holders(&cloud.position[i]),
-            Some(_) if self.interface == Interface::Faces => (None, false),
+            Some(_) if self.interface == Interface::FACES => (None, false),
             Some((cell, _)) => {
                 let material = self.elastic.material[*cell as usize];
                 let is_known = several.used().contains(&material);
@@ -121,7 +121,7 @@ impl<const D: usize> Model<D> {
 
     /// Refuses a seam along the border of two materials where rows at the seam are balanced for one: bonds across would take the strain of the elements for that of the points.
     pub(crate) fn check_seam_on_border(&self, law: &dyn Law<D>) -> Result<(), ModelError> {
-        if law.several().is_none() || self.interface == Interface::Faces {
+        if law.several().is_none() || self.interface == Interface::FACES {
             return Ok(());
         }
         let holds: Vec<bool> = self.roles.iter().map(|&r| r == CellRole::Points).collect();

@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::{
     mesh::{CellShape, Mesh},
-    model::{Interface, Zone, ZoneLayout},
+    model::{Zone, ZoneLayout},
     peridynamics::{Accelerator, BondWeights, BoxCell, Horizon, Law, PartialVolume, PointError},
     shape::{Barrier, Shape},
     tensor::{Tensor4, Vector},
@@ -157,7 +157,7 @@ pub(crate) fn takes_law<const D: usize>(
 ) -> Result<(), ModelError> {
     let law = peridynamics.map(|p| &p.law);
     // what a seam of truncated bonds cuts follows the linearisation, two horizons deep
-    if coupling.interface() == Interface::Faces
+    if coupling.interface().faces
         && law.is_some_and(|law| law.linearised().has_deviators() && !law.is_linear())
     {
         return Err(ModelError::Unsupported {

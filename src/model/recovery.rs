@@ -13,7 +13,7 @@ use crate::{
     assembly::Transfer,
     mesh::Mesh,
     model::{
-        CellRole, Interface, Model, SiteKind, bins::Bins, interface_interpolation::Sites,
+        CellRole, Model, SiteKind, bins::Bins, interface_interpolation::Sites,
         least_squares_gradient, point_cloud::PointCloud, recovery_patch::Patch,
     },
     parallel,
@@ -27,18 +27,17 @@ const COINCIDES: f64 = 1e-12;
 impl<const D: usize> Model<D> {
     /// Expresses the points of a cloud through sites, with what interpolation lacks in elements where some lie between the nodes; `site` names that of a point that is one.
     ///
-    /// If bonds end on faces, a point behind them is a place only, and interpolation will do; elsewhere forces of points depend on it.
+    /// If nothing overlaps, a point behind a face is a place only, and interpolation will do; elsewhere forces of points depend on it.
     pub(crate) fn transfer_of(
         &self,
         sites: &Sites<'_, D>,
         cloud: &PointCloud<D>,
         site: impl Fn(usize) -> u32 + Sync,
     ) -> (Transfer, FxHashMap<u32, Patch<D>>) {
-        let patches = match self.interface {
-            Interface::Faces | Interface::Feet => FxHashMap::default(),
-            // families of other clouds carry no affine field, and no better ghost would mend that
-            _ if !self.is_lattice() => FxHashMap::default(),
-            _ => patches(
+        // families of other clouds carry no affine field, and no better ghost would mend that
+        let patches = match self.interface.overlap && self.is_lattice() {
+            false => FxHashMap::default(),
+            true => patches(
                 sites,
                 cloud,
                 &self.node_transfer,

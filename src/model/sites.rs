@@ -32,7 +32,7 @@ impl<const D: usize> Model<D> {
         }
         let mut node_site = vec![NONE; self.mesh.nodes.len()];
         for n in 0..self.mesh.nodes.len() {
-            let constrained = matches!(interface, Interface::Constrained(_)) && points[n];
+            let constrained = interface.constrained.is_some() && points[n];
             let tied = self.ties.ends(n as u32).is_some();
             if element[n] && !constrained && !tied {
                 node_site[n] = self.sites.len() as u32;

@@ -48,17 +48,62 @@ impl Reach {
     }
 }
 
-/// Which nodes of finite elements at the seam are sites, and which follow the sites around them.
+/// Places that rows at a seam need beside sites; two sets of rows on one model need those of both, [`Interface::with`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Interface {
-    /// Nodes of the seam are sites; the elements overlap into the peridynamic zone by one cell, whose far nodes follow the PD points around them.
-    Overlap,
-    /// Nodes of the seam follow a least-squares fit to the sites within a horizon, [SAND2015-7998] section 7.3.
-    Constrained(FitDegree),
-    /// Nodes of the seam are sites with the rows of their own elements only: nothing overlaps, and bonds end on the faces of elements.
-    Faces,
-    /// As [`Interface::Faces`], where families end at places on the faces.
-    Feet,
+pub struct Interface {
+    /// Both models go on behind the seam: places in elements complete families, and elements overlap into the peridynamic zone by one cell, whose far nodes follow the PD points around them. Without, nodes have the rows of their own elements only.
+    pub overlap: bool,
+    /// The fit to the sites within a horizon that nodes of the seam follow, [SAND2015-7998] section 7.3; without, they are sites.
+    pub constrained: Option<FitDegree>,
+    /// Bonds end on the faces of elements, behind which the lattice is continued.
+    pub faces: bool,
+    /// Families end at places on the faces.
+    pub feet: bool,
+}
+
+impl Interface {
+    const SITES: Self = Self {
+        overlap: false,
+        constrained: None,
+        faces: false,
+        feet: false,
+    };
+
+    /// Nodes of the seam are sites, and both models go on behind it.
+    pub const OVERLAP: Self = Self {
+        overlap: true,
+        ..Self::SITES
+    };
+
+    /// Nodes of the seam are sites, nothing overlaps, and bonds end on the faces of elements.
+    pub const FACES: Self = Self {
+        faces: true,
+        ..Self::SITES
+    };
+
+    /// As [`Interface::FACES`], where families end at places on the faces.
+    pub const FEET: Self = Self {
+        feet: true,
+        ..Self::SITES
+    };
+
+    /// Both models go on behind the seam, whose nodes follow a fit of this degree.
+    pub const fn constrained(degree: FitDegree) -> Self {
+        Self {
+            constrained: Some(degree),
+            ..Self::OVERLAP
+        }
+    }
+
+    /// The places of both, where nodes of the seam are sites in both and families end at feet in none.
+    #[must_use]
+    pub const fn with(self, other: Self) -> Self {
+        Self {
+            overlap: self.overlap || other.overlap,
+            faces: self.faces || other.faces,
+            ..self
+        }
+    }
 }
 
 /// Demands of a coupling on the model: role of each cell, treatment of the seam, and extent of the families.
@@ -92,6 +137,6 @@ pub trait ZoneLayout<const D: usize>: Send + Sync {
         false
     }
 
-    /// The treatment of nodes at the seam.
+    /// The places that its rows need at the seam.
     fn interface(&self) -> Interface;
 }

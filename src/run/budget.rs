@@ -7,7 +7,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::mesh::Mesh;
-use crate::model::{CellRole, Interface, Reach, Zone};
+use crate::model::{CellRole, Reach, Zone};
 use crate::observe::report::number;
 use crate::observe::summary::{bytes_text, grouped, resident_memory_bytes};
 use crate::peridynamics::TIE_TOLERANCE;
@@ -147,7 +147,7 @@ impl Counts {
             }
         };
         let around = spacing.map(|h| (h, levels * largest));
-        let is_continued = coupling.interface() == Interface::Faces;
+        let is_continued = coupling.interface().faces;
         (counts.ghosts, counts.looked_at) = match around {
             Some((h, margin)) => beside(mesh, &roles, h, margin, is_continued),
             None => ((mesh.cell_count() as f64 - counts.points).max(0.0), 0.0),

@@ -120,7 +120,7 @@ pub(super) fn loaded_nodes<const D: usize>(
     let integral = |site: usize| {
         let mut sum = Vector::<D>::zeros();
         for (c, local) in model.cells_of_site(site) {
-            if model.node_takes(c) {
+            if model.is_element(c) {
                 fem::for_each_point(&model.mesh, c, fem::Rule::Stiffness, |p| {
                     sum += p.gradient[local] * p.weight;
                 });

@@ -113,7 +113,7 @@ impl<const D: usize> ZoneLayout<D> for Truncated {
     }
 
     fn interface(&self) -> Interface {
-        Interface::Faces
+        Interface::FACES
     }
 
     fn takes_deviators(&self) -> bool {
@@ -253,7 +253,7 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
                 }
             }
             None => {
-                self.model.add_element_rows(site, row);
+                self.model.add_rows_of_own_elements(site, row);
                 self.pieces.strings.add_row(site, row);
             }
         }
@@ -310,7 +310,7 @@ impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
             bonds,
             add_rest: Box::new(|site, row| {
                 if self.model.point_of(site).is_none() {
-                    self.model.add_element_rows(site, row);
+                    self.model.add_rows_of_own_elements(site, row);
                     self.pieces.strings.add_row(site, row);
                     // the elements behind the seam have other dilatations, with the bonds
                     self.pieces.dilatations.take_back(site, row);

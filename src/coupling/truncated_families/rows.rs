@@ -40,7 +40,7 @@ impl<const D: usize> ZoneLayout<D> for TruncatedFamilies {
     }
 
     fn interface(&self) -> Interface {
-        Interface::Feet
+        Interface::FEET
     }
 }
 

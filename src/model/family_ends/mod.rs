@@ -1,4 +1,4 @@
-//! Families that end at feet, places on the faces of elements, for couplings with [`Interface::Feet`](crate::model::Interface::Feet).
+//! Families that end at feet, places on the faces of elements, for couplings with [`Interface::FEET`](crate::model::Interface::FEET).
 //!
 //! | file | content |
 //! |---|---|

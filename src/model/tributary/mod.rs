@@ -156,7 +156,7 @@ impl<const D: usize> Model<D> {
             return false;
         };
         let is_hindered = !p.voids.is_empty() || !p.barriers.is_empty();
-        if self.has_energy || self.interface != Interface::Overlap || is_hindered {
+        if self.has_energy || self.interface != Interface::OVERLAP || is_hindered {
             return false;
         }
         let cells = Cells { origin, spacing };

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::{
     assembly::Transfer,
-    model::{Bins, Interface, Model},
+    model::{Bins, Model},
     parallel,
     peridynamics::bounded_least_norm::{Bound, least_change},
     shape::Barriers,
@@ -31,9 +31,7 @@ impl<const D: usize> Model<D> {
 
 /// The weights of all nodes, none of them negative where sites lie all around; none of a model whose nodes follow no such fit.
 pub(super) fn shares<const D: usize>(model: &Model<D>) -> Option<Transfer> {
-    if !matches!(model.interface, Interface::Constrained(_)) {
-        return None;
-    }
+    model.interface.constrained?;
     let barriers = model.peridynamics.as_ref();
     let barriers = Barriers::new(barriers.map_or(Vec::new(), |p| p.barriers.clone()));
     let positions: Vec<Vector<D>> = model.sites.iter().map(|s| s.position).collect();

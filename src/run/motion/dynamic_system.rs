@@ -29,7 +29,7 @@ use crate::system::{LinearMotion, Ranks, SemiDiscrete};
 use crate::tensor::Vector;
 use crate::{
     coupling::{BrokenBonds, Coupling, Definiteness, Operator},
-    model::{Interface, Model, Site, SiteKind},
+    model::{Model, Site, SiteKind},
 };
 
 /// Dynamic system of a scene, with its memory and its properties.
@@ -241,12 +241,10 @@ fn tell_bonds<const D: usize>(
         });
     }
     if model.body().is_some() {
-        let at_seam = match (coupling.interface(), motion.has_seam_bonds()) {
+        let at_seam = match (coupling.interface().faces, motion.has_seam_bonds()) {
             _ if is_linear => "",
-            (Interface::Faces, true) => ", as do bonds that end on faces of elements",
-            (Interface::Faces, false) => {
-                "; within two horizons of the seam they are linear and do not break"
-            }
+            (true, true) => ", as do bonds that end on faces of elements",
+            (true, false) => "; within two horizons of the seam they are linear and do not break",
             _ => "",
         };
         choices.push(Decision {
