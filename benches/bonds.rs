@@ -155,6 +155,7 @@ fn list<const D: usize>(
         failure: critical.map(|s| Failure {
             critical: BondCriterion::Uniform(s),
             no_fail: &[],
+            softening: None,
         }),
         precracked: None,
         layout: Layout::List,
@@ -187,8 +188,9 @@ fn time<const D: usize>(pass: &mut dyn BondPass<D>, passes: usize) -> Vec<f64> {
         (0..passes)
             .map(|_| {
                 let start = cpu();
-                let broken =
-                    pass.force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Update);
+                let broken = pass
+                    .force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Update)
+                    .broken;
                 assert_eq!(broken, 0);
                 (cpu() - start) / bonds
             })

@@ -8,7 +8,7 @@
 //! | `shared_blocks.rs`, `spmv.rs`, `exact_sum.rs`, `segments.rs` | rows that share blocks; products, exact sums, ranges of sites |
 //! | `element_tangent.rs`, `springs.rs`, `neighbour_springs.rs` | parts of the tangent that elements and springs add |
 //! | `ranks.rs`, `partition.rs`, `ghosts.rs`, `shared_steps.rs` | several processes, and which sites each has |
-//! | `place_stress.rs`, `body_state.rs` | the stress of a place; damage, stresses and memory of a body |
+//! | `place_stress.rs`, `body_state.rs`, `bond_changes.rs` | the stress of a place; damage, stresses and memory of a body; bonds that broke |
 //! | `term.rs`, `with_terms.rs` | force terms beside a body, and their sum |
 //! | `tangent.rs`, `history.rs` | the tangent of a system; its memory, damage and dissipation |
 //! | `linear_motion.rs` | a system of a matrix |
@@ -16,6 +16,7 @@
 use crate::parallel;
 
 mod body_state;
+mod bond_changes;
 mod element_tangent;
 mod exact_sum;
 mod ghosts;
@@ -35,6 +36,7 @@ mod term;
 mod with_terms;
 
 pub use body_state::BodyState;
+pub use bond_changes::BondChanges;
 pub use element_tangent::ElementTangent;
 pub use exact_sum::ExactSum;
 pub use ghosts::{Ghosts, Traffic};
@@ -170,14 +172,14 @@ pub trait SemiDiscrete: Tangent + BodyHistory + Send + Sync {
     /// Lumped mass of each site \[kg\].
     fn mass(&self) -> &[f64];
 
-    /// Overwrites `force` with the internal force `F(u, t, Δt)` at the end of an interval that begins where [`BodyHistory::commit`] was called last (`K u` of a linear system); returns how many bonds this pass broke.
+    /// Overwrites `force` with the internal force `F(u, t, Δt)` at the end of an interval that begins where [`BodyHistory::commit`] was called last (`K u` of a linear system); returns how many bonds this pass broke and softened.
     fn internal_force_into(
         &mut self,
         u: &[f64],
         force: &mut [f64],
         interval: Interval,
         breakage: FailureUpdate,
-    ) -> u64;
+    ) -> BondChanges;
 
     /// As [`SemiDiscrete::internal_force_into`] with bonds held, but without what [`Tangent::element_tangent`] is the tangent of: forces that are differenced. All of them where that is none.
     fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval);

@@ -308,6 +308,7 @@ fn forces_of_every_law_at_a_truncated_seam_are_derivatives_of_its_energy() {
         let behaviour = BondBehaviour {
             kinematics: BondKinematics::Exact,
             failure: None,
+            softening: None,
             no_fail: &|_| false,
             contact: None,
             storage: Storage::Double,

@@ -24,8 +24,8 @@ use crate::{
     model::Model,
     peridynamics::bond_force::HeatedBonds,
     system::{
-        BlockCsr, BodyHistory, BodyState, Dissipation, ElementTangent, FailureUpdate, Halfway,
-        Interval, RateBounds, SemiDiscrete, SharedSteps, Symmetry, Tangent,
+        BlockCsr, BodyHistory, BodyState, BondChanges, Dissipation, ElementTangent, FailureUpdate,
+        Halfway, Interval, RateBounds, SemiDiscrete, SharedSteps, Symmetry, Tangent,
     },
 };
 use behaviour::NONE;
@@ -106,13 +106,13 @@ impl<const D: usize> SemiDiscrete for CoupledSystem<'_, D> {
         force: &mut [f64],
         interval: Interval,
         update: FailureUpdate,
-    ) -> u64 {
-        let broken = self.linear_rows_and_bonds_into(u, force, interval, update);
+    ) -> BondChanges {
+        let changes = self.linear_rows_and_bonds_into(u, force, interval, update);
         if let Some(elements) = &mut self.elements {
             elements.add_force(self.model, u, interval, force);
         }
         self.finish(force);
-        broken
+        changes
     }
 
     fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {

@@ -204,6 +204,7 @@ fn a_wave_keeps_its_energy_and_momentum_where_zones_change_under_it() {
     let behaviour = BondBehaviour::<2> {
         kinematics: BondKinematics::Linear,
         failure: None,
+        softening: None,
         no_fail: &|_| false,
         contact: None,
         storage: crate::peridynamics::bond_force::Storage::Double,

@@ -302,6 +302,21 @@ impl<const D: usize> WholeFamily<D> {
         plane_energy(self.spacing, &self.bonds, state, deviator)
     }
 
+    /// Energy that bonds which act alone take across a plane, `Σ ½ |ξ·n| p |ξ|⁴ V`, its mean over all normals over that over the axes.
+    pub fn mean_over_axis_planes(&self) -> f64 {
+        // mean of |cos| over the directions of a bond
+        let mean_cosine = [1.0, std::f64::consts::FRAC_2_PI, 0.5][D - 1];
+        let (mut over_all, mut over_axes) = (0.0, 0.0);
+        for (k, (p, _)) in &self.bonds {
+            let square = f64::from(k.iter().map(|k| k * k).sum::<i32>());
+            let energy = p * square * square;
+            let steps: i32 = k.iter().map(|k| k.abs()).sum();
+            over_all += energy * mean_cosine * square.sqrt();
+            over_axes += energy * f64::from(steps) / D as f64;
+        }
+        over_all / over_axes
+    }
+
     /// All bonds by their integer offsets, in their order, with `p` and `ω`.
     pub fn bonds(&self) -> impl Iterator<Item = ([i32; D], (f64, f64))> + '_ {
         self.bonds.iter().copied()

@@ -326,6 +326,21 @@ impl<const D: usize> Model<D> {
         self.plane_energies_of(p.law.linearised())
     }
 
+    /// Energy that bonds across a plane take, its mean over the directions of the plane over that along the axes of the lattice, of each lattice.
+    ///
+    /// # Errors
+    /// [`ModelError::Family`] if the law has no coefficients there.
+    pub fn mean_over_axis_planes(&self) -> Result<Vec<f64>, ModelError> {
+        let Some(p) = &self.peridynamics else {
+            return Ok(Vec::new());
+        };
+        let of = |(factors, horizon): &(LatticeFactors<D>, f64)| {
+            let family = factors.regular_family(p.law.linearised(), *horizon)?;
+            Ok(family.mean_over_axis_planes())
+        };
+        self.lattices.factors.iter().map(of).collect()
+    }
+
     /// As [`Model::plane_energies`], of a body all of whose points have that law.
     pub fn plane_energies_of(
         &self,

@@ -44,7 +44,10 @@ pub(crate) fn unusual_stretch<const D: usize>(
     model: &Model<D>,
     rest: &RunSettings<D>,
 ) -> Result<Option<String>, RunError> {
-    let stretch = failing_stretch(model, rest)?;
+    // of bonds that soften that at which they would break at once: by it units are known
+    let softening = rest.breaking.softening.softening();
+    let stretch =
+        failing_stretch(model, rest)?.map(|s| softening.map_or(s, |of| s * of.ratio.sqrt()));
     Ok(stretch.filter(|s| !USUAL_STRETCHES.contains(s)).map(|s| {
         format!(
             "bonds break at a stretch of {}: check the units of Young's modulus, fracture energy and lengths, which must be consistent (N, m, Pa and J/m², or N, mm, MPa and N/mm)",

@@ -7,8 +7,10 @@ use super::materials::Material;
 use super::region::{Region, region};
 use super::spec::{
     BondsSpec, CalibrationSpec, ContactSpec, EdgeSpec, PrecisionSpec, SceneSpec, SolveSpec,
+    WeightsSpec,
 };
 use crate::mesh::Mesh;
+use crate::peridynamics::bond_force::BondSoftening;
 use crate::peridynamics::failure::Fracture;
 
 /// Deformation and fracture of bonds, and contact. A scene that names neither fracture nor contact has none, and pays for none.
@@ -22,6 +24,8 @@ pub struct Breaking<const D: usize> {
     pub fracture: Option<Fracture>,
     /// Fracture criteria of each material and of the interfaces, where points have several materials.
     pub several: Option<FractureOfMaterials>,
+    /// Softening of bonds that break by the fracture energy.
+    pub softening: SofteningChoice,
     /// Calibration of the critical stretch to a fracture energy.
     pub calibration: CalibrationSpec,
     /// True if the law of the peridynamic material damages its bonds.
@@ -155,6 +159,84 @@ fn material_that_breaks<'a, const D: usize>(
     (material, fracture)
 }
 
+/// Growth of the largest stretch of a bond, in parts of that between the onset of softening and its end, below which load steps let it be: equilibria are sought with bonds held.
+const TOLERANCE: f64 = 0.01;
+
+/// Softening of bonds that a scene has, or the reason why they break at once although no key says so.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SofteningChoice {
+    /// Bonds soften.
+    Soften(BondSoftening),
+    /// Bonds would soften, but for a reason.
+    AtOnceFor(&'static str),
+    /// Bonds break at once: their law, their criterion or a key says so.
+    AtOnce,
+}
+
+impl SofteningChoice {
+    /// The softening, if bonds soften.
+    pub fn softening(self) -> Option<BondSoftening> {
+        match self {
+            Self::Soften(softening) => Some(softening),
+            Self::AtOnceFor(_) | Self::AtOnce => None,
+        }
+    }
+}
+
+/// Returns the softening of bonds.
+fn softening_of<const D: usize>(
+    spec: &SceneSpec,
+    materials: &[Material<D>],
+    used: &[u16],
+) -> Result<SofteningChoice, SceneError> {
+    let softens = |m: &&Material<D>| m.fracture.is_some_and(|f| f.softening > 1.0);
+    let is_typed = |m: &&Material<D>| m.fracture.is_some_and(|f| f.types_softening);
+    let of_points = || used.iter().map(|&m| &materials[usize::from(m)]);
+    let typed = of_points().filter(softens).find(is_typed);
+    let Some((material, fracture)) = (typed.or_else(|| of_points().find(softens)))
+        .and_then(|material| Some((material, material.fracture?)))
+    else {
+        return Ok(SofteningChoice::AtOnce);
+    };
+    let weights = spec.peridynamics.as_ref().map(|p| p.weights);
+    let reasons = [
+        (used.len() > 1, "points have several materials"),
+        (
+            spec.zones.follow.is_some(),
+            "the zone moves, and would forget how far bonds have softened",
+        ),
+        (spec.temperature.is_some(), "their temperature changes"),
+        (
+            weights == Some(WeightsSpec::Fitted),
+            "their weights are fitted, and differ between their ends",
+        ),
+    ];
+    let against = reasons
+        .iter()
+        .find(|(holds, _)| *holds)
+        .map(|(_, why)| *why);
+    if let Some(against) = against {
+        if !fracture.types_softening {
+            return Ok(SofteningChoice::AtOnceFor(against));
+        }
+        let mut names = spec.materials.keys();
+        let name = names.find(|name| name.value == material.name);
+        let text = format!(
+            "bonds of the material `{}` soften, but {against}",
+            material.name
+        );
+        return Err(SceneError::new(SceneErrorKind::Conflict, text)
+            .label(name.map_or(0..0, |name| name.span.clone()), "softens")
+            .help("type softening = 1, for bonds that break at once"));
+    }
+    let solve = spec.solve.as_ref().map(|s| s.get_ref());
+    let in_time = matches!(solve, Some(SolveSpec::Explicit(_)));
+    Ok(SofteningChoice::Soften(BondSoftening {
+        ratio: fracture.softening,
+        tolerance: if in_time { 0.0 } else { TOLERANCE },
+    }))
+}
+
 /// Returns the deformation and fracture of the bonds of points whose materials are those that are `used`.
 pub(crate) fn breaking<const D: usize>(
     spec: &SceneSpec,
@@ -224,6 +306,7 @@ pub(crate) fn breaking<const D: usize>(
             interfaces,
         }),
         damages: material.law.damages(),
+        softening: softening_of(spec, materials, used)?,
         calibration: calibration.map_or(CalibrationSpec::Lattice, |c| *c.get_ref()),
         no_fail,
         at_edge: spec

@@ -165,11 +165,15 @@ fn fracture<const D: usize>(
             Fracture {
                 criterion: failure::FRACTURE_ENERGY,
                 value: bounds_checks::positive(&place("fracture-energy"), energy)?,
+                softening: 1.0,
+                types_softening: false,
             }
         }
         (None, Some(stretch)) => Fracture {
             criterion: failure::CRITICAL_STRETCH,
             value: bounds_checks::positive(&place("critical-stretch"), stretch)?,
+            softening: 1.0,
+            types_softening: false,
         },
     };
     if !law.has_breakable_bonds() {

@@ -10,11 +10,11 @@ use super::peridynamics;
 use super::region::region;
 use super::spec::{CellsSpec, Given, MaterialSpec, MicromodulusSpec, ShapeSpec};
 use super::user_material;
-use super::value::Text;
+use super::value::{Number, Text};
 use crate::material::{Elastic, Kinematics};
 use crate::mesh::Mesh;
-use crate::peridynamics::failure::Fracture;
-use crate::peridynamics::laws::{Constants, Parameter};
+use crate::peridynamics::failure::{FRACTURE_ENERGY, Fracture};
+use crate::peridynamics::laws::{Constants, Parameter, SOFTENING};
 use crate::peridynamics::{Influence, Law, Micromodulus};
 use crate::tensor::Tensor4;
 
@@ -294,10 +294,36 @@ fn place_of_word(
     })
 }
 
+/// The number of the key `softening`, or none if it is left out, of a law that has it.
+fn softening(spec: &MaterialSpec) -> Option<Option<&Number>> {
+    let MaterialSpec::Named(m) = spec else {
+        return None;
+    };
+    let place = (m.law.parameters().iter()).position(|p| *p == SOFTENING)?;
+    match m.parameters.get(place)? {
+        Some(Given::Number(number)) => Some(Some(number)),
+        Some(Given::Word(_)) | None => Some(None),
+    }
+}
+
 fn fracture(name: &Text, spec: &MaterialSpec) -> Result<Option<Fracture>, SceneError> {
     let law = spec.law();
+    let softens = softening(spec);
+    let typed_ratio = softens.flatten();
     let mut typed = spec.failure().into_iter();
-    let Some((criterion, number)) = typed.next() else {
+    let found = typed.next();
+    let has_energy = found
+        .as_ref()
+        .is_some_and(|(c, _)| c.key() == FRACTURE_ENERGY.key());
+    if let (Some(ratio), false) = (typed_ratio.filter(|r| r.value > 1.0), has_energy) {
+        return Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!("`materials.{name}.{law}.softening` is {}", ratio.value),
+        )
+        .label(ratio.span.clone(), "bonds soften by a fracture energy")
+        .help("add fracture-energy, or remove this"));
+    }
+    let Some((criterion, number)) = found else {
         return Ok(None);
     };
     if let Some((other, second)) = typed.next() {
@@ -315,7 +341,15 @@ fn fracture(name: &Text, spec: &MaterialSpec) -> Result<Option<Fracture>, SceneE
     }
     let place = format!("materials.{name}.{law}.{}", criterion.key());
     let value = bounds_checks::positive(&place, number)?;
-    Ok(Some(Fracture { criterion, value }))
+    Ok(Some(Fracture {
+        criterion,
+        value,
+        softening: match softens.filter(|_| has_energy) {
+            Some(typed) => typed.map_or(SOFTENING.default.unwrap_or(1.0), |ratio| ratio.value),
+            None => 1.0,
+        },
+        types_softening: typed_ratio.is_some(),
+    }))
 }
 
 /// The largest modulus, whose square times those of lengths still is a number.

@@ -424,6 +424,7 @@ y = 0.01
                 let behaviour = BondBehaviour {
                     kinematics,
                     failure: Some(BondThreshold::Uniform(1.0)),
+                    softening: None,
                     no_fail: &|_| false,
                     contact: None,
                     storage: crate::peridynamics::bond_force::Storage::Double,

@@ -106,15 +106,15 @@ impl<'a> Explicit<'a> {
             end: state.time,
             length: 0.0,
         };
-        let broken = system.internal_force_into(&state.u, &mut force, at_start, breakage);
-        if broken > 0 {
+        let changes = system.internal_force_into(&state.u, &mut force, at_start, breakage);
+        if !changes.is_none() {
             system.account_for_breaks(&Halfway::at(&state.u));
         }
         if starts {
             // what a resumed system remembers is committed: to respond to it once more changes it by rounding
             system.commit();
         }
-        state.broken += broken;
+        state.broken += changes.broken;
         let inverse_mass: Vec<f64> = system.mass().iter().map(|m| 1.0 / m).collect();
         let mut motion = Explicit {
             system,
@@ -303,13 +303,13 @@ impl<'a> Explicit<'a> {
         };
         let update = FailureUpdate::Update;
         let (u, force) = (&self.state.u, &mut self.force);
-        let broken = self.system.internal_force_into(u, force, interval, update);
-        if broken > 0 {
+        let changes = self.system.internal_force_into(u, force, interval, update);
+        if !changes.is_none() {
             self.system
                 .account_for_breaks(&self.state.halfway(self.params.step));
         }
         shared::Outcome {
-            broken,
+            broken: changes.broken,
             ..Default::default()
         }
     }

@@ -1,8 +1,8 @@
 use super::*;
 use crate::solve::stable_step::{stable_step, tests::springs};
 use crate::system::{
-    BlockCsr, BodyHistory, BodyState, Dissipation, ElementTangent, FailureUpdate, Halfway,
-    Interval, RateBounds, SharedSteps, Tangent,
+    BlockCsr, BodyHistory, BodyState, BondChanges, Dissipation, ElementTangent, FailureUpdate,
+    Halfway, Interval, RateBounds, SharedSteps, Tangent,
 };
 
 /// Stores no zeros, of which most of a row of springs consists.
@@ -190,7 +190,7 @@ impl SemiDiscrete for Fed {
         force: &mut [f64],
         interval: Interval,
         b: FailureUpdate,
-    ) -> u64 {
+    ) -> BondChanges {
         self.system.internal_force_into(u, force, interval, b)
     }
 

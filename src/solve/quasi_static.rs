@@ -304,11 +304,11 @@ impl Run<'_> {
                 interval,
                 FailureUpdate::Update,
             );
-            if now == 0 {
+            if now.is_none() {
                 break residual;
             }
             self.system.account_for_breaks(&Halfway::at(u));
-            broken += now;
+            broken += now.broken;
             rounds += 1;
             self.is_torn = true;
             self.aids.progress.tell(&format!(

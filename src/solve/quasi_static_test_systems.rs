@@ -1,8 +1,8 @@
 //! Systems of a few unknowns for the tests of load steps.
 
 use crate::system::{
-    BlockCsr, BodyHistory, BodyState, Dissipation, ElementTangent, FailureUpdate, Halfway,
-    Interval, RateBounds, SemiDiscrete, SharedSteps, Symmetry, Tangent,
+    BlockCsr, BodyHistory, BodyState, BondChanges, Dissipation, ElementTangent, FailureUpdate,
+    Halfway, Interval, RateBounds, SemiDiscrete, SharedSteps, Symmetry, Tangent,
 };
 
 /// Site 0 is held; fibres of stiffness 1 join it to site 1 and break beyond their own elongation; a spring of stiffness `spring` joins site 1 to site 2.
@@ -43,7 +43,7 @@ impl SemiDiscrete for Bundle {
         force: &mut [f64],
         _interval: Interval,
         breakage: FailureUpdate,
-    ) -> u64 {
+    ) -> BondChanges {
         let mut broken = 0;
         if breakage == FailureUpdate::Update {
             for (intact, limit) in self.intact.iter_mut().zip(&self.limits) {
@@ -54,7 +54,7 @@ impl SemiDiscrete for Bundle {
             }
         }
         self.tangent_into(u, force);
-        broken
+        BondChanges::broken(broken)
     }
 
     fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {
@@ -182,7 +182,7 @@ impl SemiDiscrete for Hardening {
         force: &mut [f64],
         _interval: Interval,
         _breakage: FailureUpdate,
-    ) -> u64 {
+    ) -> BondChanges {
         force.fill(0.0);
         for (i, k) in self.k.iter().enumerate() {
             let e = u[i + 1] - u[i];
@@ -190,7 +190,7 @@ impl SemiDiscrete for Hardening {
             force[i] -= f;
             force[i + 1] += f;
         }
-        0
+        BondChanges::default()
     }
 
     fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {

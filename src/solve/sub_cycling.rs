@@ -16,8 +16,8 @@
 use crate::{
     solve::stable_step::{self, StepError, StepLimit},
     system::{
-        BlockCsr, BodyHistory, BodyState, Dissipation, ElementTangent, FailureUpdate, Halfway,
-        Interval, RateBounds, SemiDiscrete, SharedSteps, Symmetry, Tangent,
+        BlockCsr, BodyHistory, BodyState, BondChanges, Dissipation, ElementTangent, FailureUpdate,
+        Halfway, Interval, RateBounds, SemiDiscrete, SharedSteps, Symmetry, Tangent,
     },
 };
 
@@ -374,12 +374,12 @@ impl SemiDiscrete for SubCycled<'_> {
         force: &mut [f64],
         interval: Interval,
         breakage: FailureUpdate,
-    ) -> u64 {
-        let broken = self
+    ) -> BondChanges {
+        let changes = self
             .system
             .internal_force_into(u, force, interval, breakage);
         self.correct(&self.fine.columns, Terms::Signed, force);
-        broken
+        changes
     }
 
     fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {
@@ -459,8 +459,9 @@ impl Tangent for SubCycled<'_> {
         self.system.symmetry()
     }
 
-    fn element_tangent(&self, u: &[f64], interval: Interval) -> Option<ElementTangent> {
-        self.system.element_tangent(u, interval)
+    /// None: that of the elements is not the tangent of what is sub-cycled, and no load step asks for it.
+    fn element_tangent(&self, _u: &[f64], _interval: Interval) -> Option<ElementTangent> {
+        None
     }
 }
 

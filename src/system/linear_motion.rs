@@ -1,8 +1,8 @@
 //! A system whose force is a matrix times its displacement.
 
 use super::{
-    BlockCsr, BodyHistory, BodyState, Dissipation, ElementTangent, FailureUpdate, Halfway,
-    Interval, RateBounds, SemiDiscrete, SharedSteps, Symmetry, Tangent,
+    BlockCsr, BodyHistory, BodyState, BondChanges, Dissipation, ElementTangent, FailureUpdate,
+    Halfway, Interval, RateBounds, SemiDiscrete, SharedSteps, Symmetry, Tangent,
 };
 
 /// A linear system that moves: its stiffness as a matrix, for scenes in which nothing breaks.
@@ -31,9 +31,9 @@ impl SemiDiscrete for LinearMotion {
         force: &mut [f64],
         _interval: Interval,
         _breakage: FailureUpdate,
-    ) -> u64 {
+    ) -> BondChanges {
         self.stiffness.multiply_into(u, force);
-        0
+        BondChanges::default()
     }
 
     fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {

@@ -4,8 +4,8 @@ use std::ops::DerefMut;
 use std::sync::Arc;
 
 use super::{
-    BlockCsr, BodyHistory, BodyState, Dissipation, ElementTangent, FailureUpdate, ForceTerm,
-    Halfway, Interval, RateBounds, SemiDiscrete, SharedSteps, Symmetry, Tangent,
+    BlockCsr, BodyHistory, BodyState, BondChanges, Dissipation, ElementTangent, FailureUpdate,
+    ForceTerm, Halfway, Interval, RateBounds, SemiDiscrete, SharedSteps, Symmetry, Tangent,
 };
 
 /// `F_body(u) + Σ F_k(u)`: the sites of the body first, after them those that a term has of its own.
@@ -76,18 +76,18 @@ where
         force: &mut [f64],
         interval: Interval,
         breakage: FailureUpdate,
-    ) -> u64 {
+    ) -> BondChanges {
         let (own, rest) = force.split_at_mut(self.dofs);
         rest.fill(0.0);
         let on_body = &u[..self.dofs];
-        let broken = (self.body).internal_force_into(on_body, own, interval, breakage);
+        let changes = (self.body).internal_force_into(on_body, own, interval, breakage);
         self.add_terms(u, force, interval);
         if let Some((at, of)) = &mut self.last {
             at.clear();
             at.extend_from_slice(u);
             *of = interval;
         }
-        broken
+        changes
     }
 
     fn force_beside_elements_into(&mut self, u: &[f64], force: &mut [f64], interval: Interval) {

@@ -344,7 +344,7 @@ fn constants_in_mixed_units_are_told() {
             "kinematics = 'plane-stress'
 coupling = 'nonlocal'
 mesh.rectangle = {{ min = [0, 0], max = [0.01, 0.01], x = {{ cells = 10 }}, y = {{ cells = 10 }} }}
-materials.glass.bond-based = {{ youngs-modulus = {modulus}, fracture-energy = {energy}, density = 2440 }}
+materials.glass.bond-based = {{ youngs-modulus = {modulus}, fracture-energy = {energy}, softening = 1, density = 2440 }}
 peridynamics.horizon = 0.003
 solve.explicit = {{ duration = 1e-9, outputs = 1 }}
 output.vtu = false"

@@ -22,6 +22,7 @@ fn behaviour<const D: usize>(
     BondBehaviour {
         kinematics,
         failure: critical_stretch.map(BondThreshold::Uniform),
+        softening: None,
         no_fail: &|_| false,
         contact: None,
         storage: bondline::peridynamics::bond_force::Storage::Double,
@@ -121,12 +122,14 @@ fn linear_bonds_are_the_assembled_stiffness() {
                 let wanted = scaled(enclosed, enclosed.stiffness.multiply(&u));
                 let (mut force, mut tangent) = (vec![0.0; u.len()], vec![0.0; u.len()]);
                 assert_eq!(
-                    motion.internal_force_into(
-                        &u,
-                        &mut force,
-                        Interval::AT_ONCE,
-                        FailureUpdate::Frozen
-                    ),
+                    motion
+                        .internal_force_into(
+                            &u,
+                            &mut force,
+                            Interval::AT_ONCE,
+                            FailureUpdate::Frozen
+                        )
+                        .broken,
                     0
                 );
                 motion.tangent_into(&u, &mut tangent);
@@ -276,12 +279,9 @@ fn bonds_break_in_the_nonlocal_zone_only_and_the_edge_is_told() {
                     .collect();
                 let mut force = vec![0.0; u.len()];
                 assert!(motion.damage_at_edge().is_none());
-                let broken = motion.internal_force_into(
-                    &u,
-                    &mut force,
-                    Interval::AT_ONCE,
-                    FailureUpdate::Update,
-                );
+                let broken = motion
+                    .internal_force_into(&u, &mut force, Interval::AT_ONCE, FailureUpdate::Update)
+                    .broken;
                 assert!(broken > 0);
                 let damage = motion.damage().unwrap();
                 let edge = motion.damage_at_edge().unwrap();
@@ -296,12 +296,14 @@ fn bonds_break_in_the_nonlocal_zone_only_and_the_edge_is_told() {
                 // for good: nothing heals, and held passes break nothing
                 let state = motion.damage_state();
                 assert_eq!(
-                    motion.internal_force_into(
-                        &vec![0.0; u.len()],
-                        &mut force,
-                        Interval::AT_ONCE,
-                        FailureUpdate::Update
-                    ),
+                    motion
+                        .internal_force_into(
+                            &vec![0.0; u.len()],
+                            &mut force,
+                            Interval::AT_ONCE,
+                            FailureUpdate::Update
+                        )
+                        .broken,
                     0
                 );
                 assert_eq!(motion.damage_state(), state);

@@ -26,6 +26,7 @@ mod position_aware_seams;
 mod restarts;
 mod scalar_damage;
 mod softening;
+mod softening_bonds;
 mod sub_steps;
 mod truncated_families;
 mod viscoelastic;

@@ -59,7 +59,7 @@ sections.cut = { point = [0.02, 0.01], normal = [1, 0] }
 /// A plate whose crack runs, with its material and coupling.
 fn plate(material: &str, coupling: &str, more: &str) -> String {
     format!(
-        "{more}\n{PULLED_PLATE}\n[materials.glass.{material}]\nyoungs-modulus = 72e9\ndensity = 2440\nfracture-energy = 3.8\n{}\n{coupling}\n",
+        "{more}\n{PULLED_PLATE}\n[materials.glass.{material}]\nyoungs-modulus = 72e9\ndensity = 2440\nfracture-energy = 3.8\nsoftening = 1\n{}\n{coupling}\n",
         if material == "lps" {
             "poisson-ratio = 0.25"
         } else {
@@ -75,6 +75,20 @@ fn cracks_run_alike_on_any_number_of_processes() {
     // bonds have broken, or nothing was compared
     let table = String::from_utf8(one["scene_tip_front.csv"].clone()).unwrap();
     assert!(table.lines().count() > 3, "{table}");
+}
+
+/// How far a bond has softened is known to the process alone that computes it, so each computes all.
+#[test]
+fn so_do_those_whose_bonds_soften() {
+    for (material, coupling) in [("bond-based", "truncated"), ("lps", "nonlocal")] {
+        let text = match coupling {
+            "nonlocal" => points_alone(material, ""),
+            _ => plate(material, "[coupling.truncated]", ""),
+        };
+        let one = assert_same(&text.replace("softening = 1", "softening = 3"), &[1, 3]);
+        let table = String::from_utf8(one["scene_tip_front.csv"].clone()).unwrap();
+        assert!(table.lines().count() > 3, "{table}");
+    }
 }
 
 #[test]

@@ -126,6 +126,7 @@ fn lay_out<T>(
         &BondBehaviour {
             kinematics: BondKinematics::Exact,
             failure: Some(BondThreshold::Uniform(0.1)),
+            softening: None,
             no_fail: &|_| false,
             contact: None,
             storage: Storage::Double,
@@ -148,7 +149,9 @@ fn told(text: &str, pass: &str, ranks: Option<&dyn Ranks>) -> Vec<u64> {
             .collect();
         let mut force = vec![0.0; u.len()];
         let update = FailureUpdate::Update;
-        let broken = system.internal_force_into(&u, &mut force, Interval::AT_ONCE, update);
+        let broken = system
+            .internal_force_into(&u, &mut force, Interval::AT_ONCE, update)
+            .broken;
         let pairs = system.broken_bonds();
         assert!(broken > 100 && pairs.len() as u64 == broken, "{broken}");
         // rows of bonds at rest, of some sites in all parts

@@ -275,6 +275,7 @@ pub fn measured<const D: usize>(
     let behaviour = BondBehaviour {
         kinematics: BondKinematics::Exact,
         failure: None,
+        softening: None,
         no_fail: &|_| false,
         contact: None,
         storage: Storage::Double,

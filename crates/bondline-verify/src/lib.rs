@@ -7,6 +7,7 @@
 //! | `truncated` | truncated bonds: symmetry, definiteness, affine fields, equilibrium, order in δ, savings by symmetry |
 //! | `seams` | cracks and waves in the plane beside every method, conditions of seams that do not follow the lattice |
 //! | `skin` | bars with free sides, with a skin of elements and without |
+//! | `growth` | the load at which a long straight crack grows, under the K-field |
 //! | `softening` | softening bonds: a notched strip pulled to separation, a notched beam in three-point bending |
 //! | `damage` | continuum damage: stress of a bar, plate with a hole of [SAND2015-7998] section 6.2.5 |
 //! | `ductile` | the notched bar of [SAND2015-7998] section 6.3.1 beside CalculiX, until it tears |
@@ -48,6 +49,7 @@ pub mod estimates;
 pub mod extremes;
 pub mod fields;
 pub mod figures;
+pub mod growth;
 pub mod horizons;
 pub mod interfaces;
 pub mod large_deformation;
@@ -158,6 +160,11 @@ pub const SUITES: &[Suite] = &[
         name: "softening",
         about: "softening bonds: energy and peak load of a notched strip pulled to separation, a notched beam in three-point bending",
         run: softening::run,
+    },
+    Suite {
+        name: "growth",
+        about: "load at which a long straight crack grows, over sqrt(G0 E'), under the K-field: laws, ratios, directions, heights in the cell",
+        run: growth::run,
     },
     Suite {
         name: "damage",

@@ -8,7 +8,7 @@ use crate::{
     coupling::BrokenBonds,
     model::Model,
     peridynamics::{
-        bond_force::{BondKinematics, KernelError, Storage},
+        bond_force::{BondKinematics, BondSoftening, KernelError, Storage},
         contact::ContactError,
         failure::StateCriterion,
     },
@@ -26,6 +26,8 @@ pub struct BondBehaviour<'a, const D: usize> {
     pub kinematics: BondKinematics,
     /// Threshold at which bonds break; none if nothing breaks them.
     pub failure: Option<BondThreshold>,
+    /// Softening of bonds up to their end, with the energy of a break at the threshold, a stretch; none for bonds that break at once.
+    pub softening: Option<BondSoftening>,
     /// Region where bonds never break.
     pub no_fail: &'a (dyn Fn(&Vector<D>) -> bool + Sync),
     /// Contact of points that no bond joins; none if they may pass through each other.

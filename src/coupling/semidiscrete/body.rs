@@ -20,7 +20,7 @@ use crate::{
         bond_force::{BondKinematics, BondPass},
         contact::{Contact, ContactSetup, contact_stiffness},
     },
-    system::{FailureUpdate, Interval, Ranks},
+    system::{BondChanges, FailureUpdate, Interval, Ranks},
     tensor::Vector,
 };
 
@@ -29,6 +29,8 @@ pub(super) struct MovingBody<const D: usize> {
     pub pass: Box<dyn BondPass<D>>,
     pub kinematics: BondKinematics,
     pub failure: Option<BondThreshold>,
+    /// True if bonds soften before they break.
+    pub softens: bool,
     /// Free expansion of bonds that take the temperature into account; none if they do not.
     pub heat: Option<PointHeat<D>>,
     /// True if the law damages bonds.
@@ -143,6 +145,7 @@ impl<const D: usize> MovingBody<D> {
             kinematics: behaviour.kinematics,
             heat,
             failure: behaviour.failure.clone(),
+            softens: behaviour.softening.is_some(),
             damages: p.law.damages(),
             contact,
             site_of_point,
@@ -170,7 +173,7 @@ impl<const D: usize> MovingBody<D> {
         sites.all(|&site| self.bonds_of_site[site as usize] != NONE)
     }
 
-    /// Overwrites the forces of the points with those of bonds and contact at the displacement `u` of the sites; returns how many bonds broke.
+    /// Overwrites the forces of the points with those of bonds and contact at the displacement `u` of the sites; returns how many bonds broke and softened.
     ///
     /// Of points that are `split` among processes, the forces of others are left open, and what they broke is broken here too.
     pub fn respond(
@@ -179,15 +182,15 @@ impl<const D: usize> MovingBody<D> {
         interval: Interval,
         update: FailureUpdate,
         split: Option<&Split<'_>>,
-    ) -> u64 {
+    ) -> BondChanges {
         let mut points = std::mem::take(&mut self.displacement);
         self.spread(u, &mut points);
         if let Some(heat) = &mut self.heat {
             heat.follow(interval.end, self.pass.as_mut());
         }
-        let mut broken = (self.pass).force_into(&points, &mut self.force, interval, update);
+        let mut changes = (self.pass).force_into(&points, &mut self.force, interval, update);
         if let Some(split) = split {
-            broken = split.exchange_breaks(self.pass.as_mut(), broken, update);
+            changes.broken = split.exchange_breaks(self.pass.as_mut(), changes.broken, update);
         }
         if let Some(contact) = &self.contact {
             let pass = &self.pass;
@@ -197,7 +200,7 @@ impl<const D: usize> MovingBody<D> {
                 .add_force(&points, &|i, j| pass.bonded(i, j), &mut self.force);
         }
         self.displacement = points;
-        broken
+        changes
     }
 
     /// Adds the forces of feet to the sites that they follow, of `points` with `D` numbers each.

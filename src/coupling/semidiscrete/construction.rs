@@ -147,6 +147,11 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         self.body.as_ref().map(|b| b.pass.as_ref())
     }
 
+    /// Returns true if bonds soften before they break.
+    pub fn softens(&self) -> bool {
+        self.body.as_ref().is_some_and(|body| body.softens)
+    }
+
     /// Returns true if the bonds that a seam cuts turn, stretch and break like others.
     pub fn has_seam_bonds(&self) -> bool {
         self.seam.is_some()
@@ -173,11 +178,12 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         let Some(seam) = &mut self.seam else {
             return body.pass.restore_damage(state);
         };
-        let of_pass = body.pass.damage_state().len();
-        let Some((of_pass, of_seam)) = state.split_at_checked(of_pass) else {
+        let held = seam.damage_state();
+        // that of the pass grows as bonds soften
+        let of_pass = state.len().checked_sub(held.len());
+        let Some((of_pass, of_seam)) = of_pass.map(|of_pass| state.split_at(of_pass)) else {
             return false;
         };
-        let held = seam.damage_state();
         if !seam.restore_damage(of_seam) {
             return false;
         }

@@ -102,6 +102,7 @@ impl<const D: usize> PassInput<'_, D> {
             .map(|critical| Failure {
                 critical,
                 no_fail: self.no_fail,
+                softening: behaviour.softening,
             }),
             precracked: broken.as_ref().map(|b| b as _),
             layout: match behaviour.storage {

@@ -25,6 +25,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
             body.contact.is_none()
                 && body.feet.is_empty()
                 && !body.pass.remembers()
+                && !body.softens
                 // an accelerator, which can leave points to others
                 && body.pass.force_states().is_none()
         };

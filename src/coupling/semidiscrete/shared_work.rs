@@ -8,7 +8,7 @@ use super::behaviour::NONE;
 use super::split::Split;
 use super::{CoupledSystem, scale_rows};
 use crate::model::Distribution;
-use crate::system::{FailureUpdate, Interval, Ranks, Spread};
+use crate::system::{BondChanges, FailureUpdate, Interval, Ranks, Spread};
 
 impl<'a, const D: usize> CoupledSystem<'a, D> {
     /// Shares the work of each pass out among processes, if there are several; all of them make the same calls from now on.
@@ -51,35 +51,35 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         self
     }
 
-    /// Overwrites `force` with that of the linear rows and of the bonds, before [`CoupledSystem::finish`]; how many bonds broke.
+    /// Overwrites `force` with that of the linear rows and of the bonds, before [`CoupledSystem::finish`]; how many bonds broke and softened.
     pub(super) fn linear_rows_and_bonds_into(
         &mut self,
         u: &[f64],
         force: &mut [f64],
         interval: Interval,
         update: FailureUpdate,
-    ) -> u64 {
-        let mut broken = 0;
+    ) -> BondChanges {
+        let mut changes = BondChanges::default();
         match &mut self.body {
             None => (self.linear).multiply_into::<D>(u, None, &mut self.products, force),
             Some(body) => {
-                broken = body.respond(u, interval, update, self.split.as_ref());
+                changes = body.respond(u, interval, update, self.split.as_ref());
                 let bonds = Some((&body.bonds_of_site[..], &body.force[..]));
                 (self.linear).multiply_into::<D>(u, bonds, &mut self.products, force);
                 body.add_feet(&body.force, force);
                 if let Some(seam) = &mut self.seam {
                     seam.begin_pass();
-                    if broken > 0 {
+                    if changes.broken > 0 {
                         seam.follow(body.pass.as_ref());
                     }
-                    broken += seam.add_force(u, force, update);
+                    changes.broken += seam.add_force(u, force, update);
                 }
             }
         }
         if let Some(stresses) = &self.stresses {
             stresses.add_force(self.model, u, force);
         }
-        broken
+        changes
     }
 
     /// Scales rows where those of the model are scaled; of processes, each then has the numbers of all.

@@ -3,6 +3,7 @@
 use super::{
     BondKinematics,
     compressed_list::{Neighbours, Weights},
+    softened_bonds::SoftenedBonds,
 };
 
 /// Limit of `t` beyond which bonds break.
@@ -40,8 +41,10 @@ pub(super) struct List<const D: usize> {
     pub bytes: Vec<usize>,
     pub(super) intact: Vec<u8>,
     pub(super) reference: u64,
-    /// Points and bonds that the last pass broke, ascending.
+    /// Points and bonds that the last pass broke, ascending; empty if they soften.
     pub(super) last: Vec<(u32, usize)>,
+    /// Bonds past the onset of softening, which have no bit; none if bonds break at once.
+    pub(super) softened: Option<SoftenedBonds>,
     /// Quantities computed of each point, see `own_points.rs`; empty if all are.
     pub(super) parts: Vec<u8>,
     /// True if the last force at own points broke bonds of points whose breaks are found here.

@@ -7,14 +7,27 @@ use crate::peridynamics::bond_force::bond_list::List;
 use crate::system::ExactSum;
 
 impl<const D: usize> Lattice<D> {
-    /// Directed bonds that the last pass broke: group, lane and offset, ascending.
-    pub(super) fn last(&self) -> Vec<(usize, usize, usize)> {
+    /// Directed bonds that the last pass took stiffness from: group, lane and offset, by point, and the part of it.
+    pub(super) fn last(&self) -> Vec<(usize, usize, usize, f64)> {
+        if let Some(softened) = &self.softened {
+            let losses = softened.losses.iter();
+            let of_loss = losses.map(|loss| {
+                let place = self.place[loss.bond.near as usize] as usize;
+                (
+                    place / LANES,
+                    place % LANES,
+                    loss.bond.slot as usize,
+                    loss.part,
+                )
+            });
+            return of_loss.collect();
+        }
         let mut bonds = Vec::with_capacity(self.broken.len());
         for b in &self.broken {
             let lanes = (0..LANES).filter(|lane| b.lanes >> lane & 1 == 1);
-            bonds.extend(lanes.map(|lane| (b.group as usize, lane, b.offset as usize)));
+            bonds.extend(lanes.map(|lane| (b.group as usize, lane, b.offset as usize, 1.0)));
         }
-        bonds.sort_unstable();
+        bonds.sort_unstable_by_key(|b| (b.0, b.1, b.2));
         bonds
     }
 
@@ -38,7 +51,7 @@ impl<const D: usize> Lattice<D> {
         lost: &mut ExactSum,
     ) {
         for bonds in self.last().chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-            let (g, lane, _) = bonds[0];
+            let (g, lane, ..) = bonds[0];
             let cell = self.stencil.groups[g] as usize + lane;
             let point = self.stencil.point_of[cell] as usize;
             let volume = self.scale.get(point).copied().unwrap_or(self.unit);
@@ -51,16 +64,16 @@ impl<const D: usize> Lattice<D> {
                 (w, w * e)
             };
             let (mut first, mut second) = (0.0, 0.0);
-            for &(_, _, offset) in bonds {
+            for &(_, _, offset, part) in bonds {
                 let (a, b) = moments(offset);
-                (first, second) = (first + a, second + b);
+                (first, second) = (first + part * a, second + part * b);
             }
             let of_point = volume
                 * match &self.solid {
                     None => 0.25 * second,
                     Some(s) => {
                         let mut left = 0.0;
-                        self.each(&self.stencil.intact, g, lane, |o, _| left += moments(o).0);
+                        self.each_left(g, lane, |o, part| left += part * moments(o).0);
                         let d = s.dilatation[g][lane];
                         // ½ K′ θ² with θ = d Σ, where K′ d = volumetric
                         let bulk = s.volumetric[g][lane] * d;
@@ -78,7 +91,7 @@ impl<const D: usize> List<D> {
         at: &dyn Fn(usize) -> [f64; D],
         lost: &mut ExactSum,
     ) {
-        for bonds in self.last.chunk_by(|a, b| a.0 == b.0) {
+        for bonds in self.losses().chunk_by(|a, b| a.0 == b.0) {
             let i = bonds[0].0 as usize;
             if !self.row[i] {
                 continue;
@@ -92,9 +105,9 @@ impl<const D: usize> List<D> {
                 (w, w * e)
             };
             let (mut first, mut second) = (0.0, 0.0);
-            for &(_, bond) in bonds {
+            for &(_, bond, part) in bonds {
                 let (a, b) = moments(bond);
-                (first, second) = (first + a, second + b);
+                (first, second) = (first + part * a, second + part * b);
             }
             let of_point = self.volume[i]
                 * match &self.solid {
@@ -102,8 +115,9 @@ impl<const D: usize> List<D> {
                     Some(c) => {
                         let family = self.offsets[i]..self.offsets[i + 1];
                         let left: f64 = family
-                            .filter(|bond| self.is_intact(i, bond - self.offsets[i]))
-                            .map(|bond| moments(bond).0)
+                            .map(|bond| (self.left_of(i, bond), bond))
+                            .filter(|(left, _)| *left > 0.0)
+                            .map(|(left, bond)| left * moments(bond).0)
                             .sum();
                         let bulk = c.volumetric[i] * c.dilatation[i];
                         0.5 * (bulk * first * (first + 2.0 * left) + c.deviatoric[i] * second)

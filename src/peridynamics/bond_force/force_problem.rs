@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::kinematics::BondKinematics;
+use super::softened_bonds::BondSoftening;
 use crate::{
     parallel,
     peridynamics::{Families, Law, PdBody, failure::StateCriterion, force_state::PLASTIC_STRAIN},
@@ -81,6 +82,8 @@ pub struct Failure<'a, const D: usize> {
     pub critical: BondCriterion<'a, D>,
     /// Points whose bonds never fail, one entry per point; empty for none.
     pub no_fail: &'a [bool],
+    /// Softening of bonds from a smaller stretch on to a larger one, with the energy of a break at the critical stretch; `None` for bonds that break at once.
+    pub softening: Option<BondSoftening>,
 }
 
 impl<const D: usize> Failure<'_, D> {
@@ -187,6 +190,14 @@ pub enum KernelError {
         /// Its name.
         law: &'static str,
     },
+    /// Bonds of a law with force states soften by that law.
+    #[error(
+        "bond pass: bonds of {law} do not soften beyond a stretch one by one; softening is for bond-based and lps"
+    )]
+    Softening {
+        /// Its name.
+        law: &'static str,
+    },
     /// A criterion of plastic flow for a law that does not flow.
     #[error(
         "bond pass: points of this law remember no plastic strain, by which bonds are to break; give a critical stretch"
@@ -230,7 +241,7 @@ impl<const D: usize> BondSetup<'_, D> {
         }
     }
 
-    /// The value of `t` beyond which a bond breaks, infinite for never.
+    /// The value of `t` beyond which a bond breaks, or begins to soften; infinite for never.
     pub(super) fn limit(&self, i: usize, k: usize, xi: &Vector<D>) -> f64 {
         let Some(failure) = self.failure else {
             return f64::INFINITY;
@@ -240,7 +251,8 @@ impl<const D: usize> BondSetup<'_, D> {
             BondCriterion::PerBond(f) => f(i, k, xi),
             BondCriterion::State(_) => return f64::INFINITY,
         };
-        self.kinematics.limit(s)
+        let handed_over = failure.softening.map_or(s, |softening| softening.limit(s));
+        self.kinematics.limit(handed_over)
     }
 
     /// Returns true if bonds of point `i` never fail.

@@ -21,7 +21,7 @@ use crate::{
         DeformedFamily, EnergyDensity, Families, ForceState, HistoryLayout, KeptDamage, Law, Past,
         PdBody, Present, StatePart, body::split_rows, failure::Flow,
     },
-    system::{ExactSum, FailureUpdate, Interval},
+    system::{BondChanges, ExactSum, FailureUpdate, Interval},
     tensor::{Tensor, Vector},
 };
 
@@ -440,7 +440,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
         force: &mut [f64],
         interval: Interval,
         breakage: FailureUpdate,
-    ) -> u64 {
+    ) -> BondChanges {
         self.last.clear();
         self.failure.keep(u);
         if breakage == FailureUpdate::Update {
@@ -459,7 +459,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
             self.gather_points(&points, u, force);
             self.points = Some(points);
             self.begin_heat();
-            return self.last.len() as u64;
+            return BondChanges::broken(self.last.len() as u64);
         }
         self.respond_all(u, interval.length);
         if breakage == FailureUpdate::Update {
@@ -467,7 +467,7 @@ impl<const D: usize> BondPass<D> for Generic<D> {
         }
         self.gather(&self.force_state, force);
         self.begin_heat();
-        self.last.len() as u64
+        BondChanges::broken(self.last.len() as u64)
     }
 
     fn commit(&mut self) -> f64 {

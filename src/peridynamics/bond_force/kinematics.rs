@@ -18,4 +18,12 @@ impl BondKinematics {
             Self::Linear => 2.0 * s,
         }
     }
+
+    /// The stretch at a value of `t`.
+    pub(crate) fn stretch(self, t: f64) -> f64 {
+        match self {
+            Self::Exact => t / (1.0 + (1.0 + t).sqrt()),
+            Self::Linear => 0.5 * t,
+        }
+    }
 }

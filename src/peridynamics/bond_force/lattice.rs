@@ -4,11 +4,12 @@ use super::{
     BondKinematics, BondPass,
     lattice_simd::{Broken, CARE, FOREIGN, FULL, IDLE, job},
     simd::LANES,
+    softened_bonds::SoftenedBonds,
     stencil::{NONE, Stencil},
 };
 use crate::{
     parallel,
-    system::{ExactSum, FailureUpdate, Interval, Segments},
+    system::{BondChanges, ExactSum, FailureUpdate, Interval, Segments},
 };
 
 /// Groups of eight points per task; a constant, so that no result depends on the number of threads.
@@ -60,8 +61,10 @@ pub(super) struct Lattice<const D: usize> {
     pub(super) u: [Vec<f64>; D],
     pub(super) sums: Vec<[f64; LANES]>,
     pub(super) reference: u64,
-    /// Bonds that the last pass broke.
+    /// Bonds that the last pass broke; empty if they soften.
     pub(super) broken: Vec<Broken>,
+    /// Bonds past the onset of softening, which have no bit; none if bonds break at once.
+    pub(super) softened: Option<SoftenedBonds>,
     /// Lanes of each group that are not left to others; empty if all are.
     pub(super) own: Vec<u8>,
     /// Points that are own or known where each process moves its own points.
@@ -90,6 +93,9 @@ impl<const D: usize> Lattice<D> {
         let mut sums = vec![[0.0; LANES]; self.stencil.groups.len() * 2];
         let field = self.field(&field_u, &[], f64::INFINITY);
         self.sweep::<EXACT, { job::MOMENTS }>(&field, IDLE, &mut flags, &mut sums);
+        if let Some(softened) = &self.softened {
+            self.add_softened_moments::<EXACT>(softened, &field_u, &mut sums);
+        }
         let mut energy = 0.0;
         for (p, &place) in self.place.iter().enumerate() {
             let volume = self.scale.get(p).copied().unwrap_or(self.unit);
@@ -165,7 +171,7 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
         force: &mut [f64],
         _interval: Interval,
         breakage: FailureUpdate,
-    ) -> u64 {
+    ) -> BondChanges {
         match self.kinematics {
             BondKinematics::Exact => self.pass::<true>(u, force, breakage, None),
             BondKinematics::Linear => self.pass::<false>(u, force, breakage, None),
@@ -182,21 +188,31 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
             None => {
                 let field = self.field(&field_x, &[], f64::INFINITY);
                 self.sweep::<false, { job::PAIR }>(&field, FOREIGN, &mut flags, &mut sums);
+                if let Some(softened) = &self.softened {
+                    self.add_softened_forces::<false>(softened, (&field_x, &[]), &mut sums);
+                }
             }
             Some(solid) => {
                 let field = self.field(&field_x, &[], f64::INFINITY);
                 self.sweep::<false, { job::MOMENTS }>(&field, IDLE, &mut flags, &mut sums);
+                if let Some(softened) = &self.softened {
+                    self.add_softened_moments::<false>(softened, &field_x, &mut sums);
+                }
                 let mut pull = vec![0.0; self.stencil.point_of.len()];
                 self.pull_from(solid, &flags, &sums, &mut pull);
                 let field = self.field(&field_x, &pull, f64::INFINITY);
                 self.sweep::<false, { job::SOLID }>(&field, FOREIGN, &mut flags, &mut sums);
+                if let Some(softened) = &self.softened {
+                    self.add_softened_forces::<false>(softened, (&field_x, &pull), &mut sums);
+                }
             }
         }
         self.collect(&sums, y);
     }
 
     fn row_sums(&self) -> Vec<f64> {
-        let bits = &self.stencil.intact;
+        // softened bonds with all of their stiffness, which they have under compression
+        let bits = &*self.standing();
         let offsets = &self.stencil.offsets;
         // by cell: Σ_l |∂θ/∂u_l|
         let mut dilatations = vec![
@@ -294,8 +310,10 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
             self.each(&self.stencil.reference, g, lane, |_, there| {
                 all += self.volume[there]
             });
-            self.each(&self.stencil.intact, g, lane, |_, there| {
-                left += self.volume[there]
+            let here = (self.stencil.groups[g] as usize + lane) as isize;
+            self.each_left(g, lane, |o, part| {
+                let there = here + self.stencil.offsets[o].delta;
+                left += part * self.volume[there as usize];
             });
             if left != all {
                 *damage = 1.0 - left / all;
@@ -317,13 +335,17 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
     }
 
     fn broken(&self) -> u64 {
-        self.reference - ones(&self.stencil.intact)
+        let softened = self.softened.iter().flat_map(SoftenedBonds::bonds).count();
+        self.reference - ones(&self.stencil.intact) - softened as u64
     }
 
     fn last_broken(&self) -> Vec<(u32, u32)> {
+        if let Some(softened) = &self.softened {
+            return softened.last_broken();
+        }
         let point = |cell: usize| self.stencil.point_of[cell];
         let last = self.last().into_iter();
-        last.map(|(g, lane, offset)| {
+        last.map(|(g, lane, offset, _)| {
             let cell = self.stencil.groups[g] as usize + lane;
             let there = cell as isize + self.stencil.offsets[offset].delta;
             (point(cell), point(there as usize))
@@ -351,8 +373,9 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
         let Some(there) = self.cell(j) else {
             // a point without a family, in elements: it has a cell, but no place
             let mut is_bonded = false;
-            self.each(&self.stencil.intact, g, here % LANES, |_, cell| {
-                is_bonded |= self.stencil.point_of[cell] == j as u32;
+            self.each_left(g, here % LANES, |o, _| {
+                let cell = here as isize + offsets[o].delta;
+                is_bonded |= self.stencil.point_of[cell as usize] == j as u32;
             });
             return is_bonded;
         };
@@ -361,21 +384,32 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
         offsets
             .iter()
             .position(|o| o.delta == delta)
-            .is_some_and(|o| self.stencil.intact[g * offsets.len() + o] >> (here % LANES) & 1 == 1)
+            .is_some_and(|o| {
+                let intact = self.stencil.intact[g * offsets.len() + o];
+                let softened = self.softened.as_ref();
+                intact >> (here % LANES) & 1 == 1 || softened.is_some_and(|s| s.has(i, o as u64))
+            })
     }
 
     fn damage_state(&self) -> Vec<u64> {
         if self.limit == f64::INFINITY {
             return Vec::new();
         }
-        super::pack(&self.stencil.intact, self.reference)
+        let mut words = super::pack(&self.stencil.intact, self.reference);
+        words.extend(self.softened.iter().flat_map(SoftenedBonds::state));
+        words
     }
 
     fn restore_damage(&mut self, state: &[u64]) -> bool {
         if self.limit == f64::INFINITY {
             return state.is_empty();
         }
-        let whole = super::unpack(state, self.reference, &mut self.stencil.intact);
+        let parts = SoftenedBonds::split(self.softened.as_ref(), state);
+        let whole = parts
+            .is_some_and(|(bits, _)| super::unpack(bits, self.reference, &mut self.stencil.intact));
+        if let (Some(softened), Some((_, bonds)), true) = (&mut self.softened, parts, whole) {
+            softened.restore(bonds);
+        }
         self.mark_full();
         whole
     }
@@ -389,7 +423,11 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
     }
 
     fn own_points(&mut self) -> Option<&mut dyn super::OwnPoints> {
-        Some(self)
+        // others would not know what has softened here
+        match self.softened {
+            Some(_) => None,
+            None => Some(self),
+        }
     }
 
     fn heated(&mut self) -> Option<&mut dyn super::HeatedBonds> {
@@ -416,5 +454,6 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
             + s.intact.len()
             + self.no_fail.len()
             + self.flags.len()
+            + (self.softened.as_ref()).map_or(0, SoftenedBonds::memory_bytes)
     }
 }

@@ -9,11 +9,12 @@ use super::{
     lattice::{COPY, Lattice, Solid, TASK},
     lattice_simd::{Bits, Broken, EARLY, FOREIGN, Field, IDLE, LATE, Task, job},
     simd::{LANES, Source, dispatch},
+    softened_bonds::SoftenedBonds,
     stencil::NONE,
 };
 use crate::{
     parallel,
-    system::{FailureUpdate, Segments},
+    system::{BondChanges, FailureUpdate, Segments},
 };
 
 impl<const D: usize> Lattice<D> {
@@ -194,6 +195,27 @@ impl<const D: usize> Lattice<D> {
         }
     }
 
+    /// Follows bonds past the onset of softening, with those that a sweep has found there, and adds them to its sums.
+    fn with_softened<const EXACT: bool>(
+        &self,
+        softened: &mut SoftenedBonds,
+        may_break: bool,
+        broken: &mut Vec<Broken>,
+        u: &[Vec<f64>; D],
+        sums: &mut [[f64; LANES]],
+    ) -> BondChanges {
+        let changes = match may_break {
+            true => self.soften::<EXACT>(softened, broken, u),
+            false => softened.hold(),
+        };
+        broken.clear();
+        match self.solid {
+            None => self.add_softened_forces::<EXACT>(softened, (u, &[]), sums),
+            Some(_) => self.add_softened_moments::<EXACT>(softened, u, sums),
+        }
+        changes
+    }
+
     /// One pass. Where others wait for forces of own points, these come first, and `told` is called once they are there.
     pub(super) fn pass<const EXACT: bool>(
         &mut self,
@@ -201,7 +223,7 @@ impl<const D: usize> Lattice<D> {
         force: &mut [f64],
         breakage: FailureUpdate,
         told: Option<Told<'_>>,
-    ) -> u64 {
+    ) -> BondChanges {
         let mut field_u = std::mem::replace(&mut self.u, std::array::from_fn(|_| Vec::new()));
         let cells = self.reach.as_ref().map(|reach| &reach.cells);
         Self::spread(&self.stencil.point_of, cells, u, &mut field_u);
@@ -230,11 +252,21 @@ impl<const D: usize> Lattice<D> {
         if self.solid.is_some() {
             self.stencil.intact = std::mem::take(&mut intact);
         }
+        let mut softened = self.softened.take();
+        let mut changes = BondChanges::default();
+        if let Some(softened) = &mut softened {
+            let (b, s) = (&mut broken, &mut sums);
+            changes = self.with_softened::<EXACT>(softened, may_break, b, &field_u, s);
+        }
         if let Some(solid) = &self.solid {
             self.pull_from(solid, &flags, &sums, &mut pull);
             let field = self.field(&field_u, &pull, f64::INFINITY);
             self.sweep::<EXACT, { job::SOLID }>(&field, first, &mut flags, &mut sums);
+            if let Some(softened) = &softened {
+                self.add_softened_forces::<EXACT>(softened, (&field_u, &pull), &mut sums);
+            }
         }
+        self.softened = softened;
         if let Some((rest, told)) = rest {
             self.collect_sent(&sums, force);
             told(force);
@@ -262,7 +294,8 @@ impl<const D: usize> Lattice<D> {
         }
         self.forget_breaks_of_others();
         let lanes = self.broken.iter().map(|b| u64::from(b.lanes.count_ones()));
-        lanes.sum()
+        changes.broken += lanes.sum::<u64>();
+        changes
     }
 
     /// The force on own points, those first that others wait for; bonds that broke are those of own points alone.
@@ -273,9 +306,10 @@ impl<const D: usize> Lattice<D> {
         breakage: FailureUpdate,
         told: Told<'_>,
     ) -> u64 {
-        match self.kinematics {
+        let changes = match self.kinematics {
             BondKinematics::Exact => self.pass::<true>(u, force, breakage, Some(told)),
             BondKinematics::Linear => self.pass::<false>(u, force, breakage, Some(told)),
-        }
+        };
+        changes.broken
     }
 }

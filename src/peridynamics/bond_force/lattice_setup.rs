@@ -5,6 +5,7 @@ use super::{
     lattice::{Lattice, Solid, TASK, ones},
     lattice_simd::EVEN,
     simd::LANES,
+    softened_bonds::SoftenedBonds,
     stencil::{NONE, Stencil},
 };
 use crate::parallel;
@@ -113,7 +114,9 @@ impl<const D: usize> Lattice<D> {
             scale,
             without_energy,
         };
-        Self::finish(stencil, filled, points, setup.kinematics, &setup.force)
+        let mut pass = Self::finish(stencil, filled, points, setup.kinematics, &setup.force)?;
+        pass.softened = (setup.failure.and_then(|f| f.softening)).map(SoftenedBonds::new);
+        Ok(pass)
     }
 
     /// The pass of a full block.
@@ -218,6 +221,7 @@ impl<const D: usize> Lattice<D> {
             reference,
             stencil,
             broken: Vec::new(),
+            softened: None,
             own: Vec::new(),
             reach: None,
             has_seen_breaks: false,

@@ -8,11 +8,12 @@ use super::{
     compressed_list::{Neighbours, Weights},
     lattice_simd::Bits,
     list_simd::{self, Sum},
+    softened_bonds::SoftenedBonds,
     stretch::psi,
 };
 use crate::{
     parallel,
-    system::{ExactSum, FailureUpdate, Interval},
+    system::{BondChanges, ExactSum, FailureUpdate, Interval},
 };
 
 /// Points per task; a constant, so that no result depends on the number of threads.
@@ -101,7 +102,7 @@ fn fill<T: Copy + Default + Send>(
 }
 
 #[inline(always)]
-fn vector<const D: usize>(u: &[f64], i: usize) -> [f64; D] {
+pub(super) fn vector<const D: usize>(u: &[f64], i: usize) -> [f64; D] {
     std::array::from_fn(|a| u[i * D + a])
 }
 
@@ -178,6 +179,7 @@ impl<const D: usize> List<D> {
             intact,
             reference: families.neighbours.len() as u64,
             last: Vec::new(),
+            softened: (setup.failure.and_then(|f| f.softening)).map(SoftenedBonds::new),
             parts: Vec::new(),
             has_seen_breaks: false,
         }
@@ -223,56 +225,90 @@ impl<const D: usize> List<D> {
         })
     }
 
-    /// The sum over intact bonds of point `i` of `f(bond, j, ξ, t, direction)`.
+    /// Calls `f(bond, j, stretched, left)` of the bonds of point `i`, with the parts of its stiffness that each has left, [`SoftenedBonds::left`].
     #[inline(always)]
     fn each<const EXACT: bool>(
         &self,
         i: usize,
         u: &[f64],
-        mut f: impl FnMut(usize, usize, &Stretched<D>),
+        mut f: impl FnMut(usize, usize, &Stretched<D>, [f64; 2]),
     ) {
         let here = vector(u, i);
         for bond in self.offsets[i]..self.offsets[i + 1] {
             if self.is_intact(i, bond - self.offsets[i]) {
                 let j = self.neighbours.get(i, bond);
                 let s = stretched::<D, EXACT>(&self.xi(i, j), &here, &u[j * D..][..D]);
-                f(bond, j, &s);
+                f(bond, j, &s, [1.0; 2]);
             }
+        }
+        let Some(softened) = &self.softened else {
+            return;
+        };
+        for bond in softened.of(i) {
+            let j = bond.far as usize;
+            let s = stretched::<D, EXACT>(&self.xi(i, j), &here, &u[j * D..][..D]);
+            f(bond.slot as usize, j, &s, SoftenedBonds::left(bond));
         }
     }
 
     fn dilatation<const EXACT: bool>(&self, solid: &Solid, i: usize, u: &[f64]) -> f64 {
         let mut sum = 0.0;
-        self.each::<EXACT>(i, u, |bond, j, s| {
+        self.each::<EXACT>(i, u, |bond, j, s, left| {
             let e = extension::<EXACT>(s.t());
-            sum += self.weights.get(bond) * s.length * self.volume[j] * e;
+            sum += left[1] * self.weights.get(bond) * s.length * self.volume[j] * e;
         });
         sum * solid.dilatation[i]
     }
 
-    /// Dilatations and forces.
+    /// Dilatations and forces; hands bonds that it finds past the onset of softening over to `softened`, if they may change.
     fn sweep<const EXACT: bool>(
         &self,
         u: &[f64],
         theta: &mut [f64],
         bits: Bits<'_>,
+        softened: Option<&mut SoftenedBonds>,
         force: &mut [f64],
-    ) -> Vec<(u32, usize)> {
+    ) -> (Vec<(u32, usize)>, BondChanges) {
+        let may_break = matches!(bits, Bits::Breaking(_));
+        let mut changes = BondChanges::default();
+        let follow = |softened: &mut SoftenedBonds, broken: &mut Vec<(u32, usize)>| {
+            let handed = std::mem::take(broken);
+            match may_break {
+                true => self.soften::<EXACT>(softened, &handed, u),
+                false => softened.hold(),
+            }
+        };
         let broken = match &self.solid {
-            None => self.add_up::<EXACT>(u, Sum::Pairwise, bits, force),
+            None => {
+                let mut broken = self.add_up::<EXACT>(u, Sum::Pairwise, bits, force);
+                if let Some(softened) = softened {
+                    changes = follow(softened, &mut broken);
+                    self.add_softened_forces::<EXACT>(softened, (u, &[]), force);
+                }
+                broken
+            }
             Some(c) => {
                 let extension =
                     |bits, theta: &mut [f64]| self.add_up::<EXACT>(u, Sum::Extension, bits, theta);
-                let (broken, left) = match bits {
+                let (mut broken, left) = match bits {
                     Bits::Held(all) => (extension(Bits::Held(all), theta), all),
                     Bits::Breaking(all) => (extension(Bits::Breaking(all), theta), &*all),
                 };
+                let mut held = None;
+                if let Some(softened) = softened {
+                    changes = follow(softened, &mut broken);
+                    self.add_softened_extensions::<EXACT>(softened, u, theta);
+                    held = Some(&*softened);
+                }
                 parallel::for_each_chunk(theta, BLOCK, 1, |block, theta| {
                     let factors = &c.dilatation[block * BLOCK..];
                     let both = theta.iter_mut().zip(factors);
                     both.for_each(|(theta, factor)| *theta *= factor);
                 });
                 self.add_up::<EXACT>(u, Sum::State(theta), Bits::Held(left), force);
+                if let Some(softened) = held {
+                    self.add_softened_forces::<EXACT>(softened, (u, theta), force);
+                }
                 broken
             }
         };
@@ -281,7 +317,8 @@ impl<const D: usize> List<D> {
             let both = force.chunks_exact_mut(D).zip(volumes);
             both.for_each(|(force, volume)| force.iter_mut().for_each(|f| *f *= -volume));
         });
-        broken
+        changes.broken += broken.len() as u64;
+        (broken, changes)
     }
 
     fn pass<const EXACT: bool>(
@@ -289,23 +326,25 @@ impl<const D: usize> List<D> {
         u: &[f64],
         force: &mut [f64],
         breakage: FailureUpdate,
-    ) -> u64 {
+    ) -> BondChanges {
         let may_break = breakage == FailureUpdate::Update && !matches!(self.limit, Limit::Never);
         let mut theta = self.solid.as_mut().map(|c| std::mem::take(&mut c.theta));
         let mut none = Vec::new();
         let theta_of = theta.as_mut().unwrap_or(&mut none);
-        self.last = if may_break {
-            let mut intact = std::mem::take(&mut self.intact);
-            let broken = self.sweep::<EXACT>(u, theta_of, Bits::Breaking(&mut intact), force);
-            self.intact = intact;
-            broken
-        } else {
-            self.sweep::<EXACT>(u, theta_of, Bits::Held(&self.intact), force)
+        let mut intact = std::mem::take(&mut self.intact);
+        let mut softened = self.softened.take();
+        let bits = match may_break {
+            true => Bits::Breaking(&mut intact),
+            false => Bits::Held(&intact),
         };
+        let changes;
+        (self.last, changes) = self.sweep::<EXACT>(u, theta_of, bits, softened.as_mut(), force);
+        self.intact = intact;
+        self.softened = softened;
         if let (Some(c), Some(theta)) = (&mut self.solid, theta) {
             c.theta = theta;
         }
-        self.last.len() as u64
+        changes
     }
 
     fn energy<const EXACT: bool>(&self, u: &[f64]) -> f64 {
@@ -314,9 +353,9 @@ impl<const D: usize> List<D> {
                 return 0.0;
             }
             let mut sum = 0.0;
-            self.each::<EXACT>(i, u, |bond, j, s| {
+            self.each::<EXACT>(i, u, |bond, j, s, left| {
                 let e = extension::<EXACT>(s.t());
-                sum += self.weights.get(bond) * self.volume[j] * e * e * s.length;
+                sum += left[0] * self.weights.get(bond) * self.volume[j] * e * e * s.length;
             });
             // pairwise: 2 p r² e² r² / 4; state-based: B ω e² r² / 2
             self.volume[i]
@@ -357,7 +396,7 @@ impl<const D: usize> BondPass<D> for List<D> {
         force: &mut [f64],
         _interval: Interval,
         breakage: FailureUpdate,
-    ) -> u64 {
+    ) -> BondChanges {
         match self.kinematics {
             BondKinematics::Exact => self.pass::<true>(u, force, breakage),
             BondKinematics::Linear => self.pass::<false>(u, force, breakage),
@@ -366,7 +405,9 @@ impl<const D: usize> BondPass<D> for List<D> {
 
     fn tangent_into(&self, x: &[f64], y: &mut [f64]) {
         let points = self.solid.as_ref().map_or(0, |_| self.points());
-        self.sweep::<false>(x, &mut vec![0.0; points], Bits::Held(&self.intact), y);
+        let mut softened = self.softened.clone();
+        let (theta, bits) = (&mut vec![0.0; points], Bits::Held(&self.intact));
+        self.sweep::<false>(x, theta, bits, softened.as_mut(), y);
     }
 
     fn row_sums(&self) -> Vec<f64> {
@@ -377,7 +418,7 @@ impl<const D: usize> BondPass<D> for List<D> {
             Some(c) => parallel::map(points, BLOCK, |i| {
                 let (mut own, mut others) = ([0.0; D], 0.0);
                 for bond in self.offsets[i]..self.offsets[i + 1] {
-                    if self.is_intact(i, bond - self.offsets[i]) {
+                    if self.stands(i, bond) {
                         let j = self.neighbours.get(i, bond);
                         let w = self.weights.get(bond) * self.volume[j];
                         for (own, x) in own.iter_mut().zip(self.xi(i, j)) {
@@ -397,7 +438,7 @@ impl<const D: usize> BondPass<D> for List<D> {
             let mut own = [[0.0; D]; D];
             let mut first = [0.0; D];
             for bond in self.offsets[i]..self.offsets[i + 1] {
-                if !self.is_intact(i, bond - self.offsets[i]) {
+                if !self.stands(i, bond) {
                     continue;
                 }
                 let j = self.neighbours.get(i, bond);
@@ -448,9 +489,7 @@ impl<const D: usize> BondPass<D> for List<D> {
             for bond in self.offsets[i]..self.offsets[i + 1] {
                 let v = self.volume[self.neighbours.get(i, bond)];
                 all += v;
-                if !self.is_intact(i, bond - self.offsets[i]) {
-                    lost += v;
-                }
+                lost += (1.0 - self.left_of(i, bond)) * v;
             }
             *damage = lost / all;
         });
@@ -463,10 +502,14 @@ impl<const D: usize> BondPass<D> for List<D> {
     fn broken(&self) -> u64 {
         let of_chunk = |_, c: &[u8]| c.iter().map(|b| u64::from(b.count_ones())).sum();
         let standing: Vec<u64> = parallel::map_chunks(&self.intact, 4096, of_chunk);
-        self.reference - standing.iter().sum::<u64>()
+        let softened = self.softened.iter().flat_map(SoftenedBonds::bonds).count();
+        self.reference - standing.iter().sum::<u64>() - softened as u64
     }
 
     fn last_broken(&self) -> Vec<(u32, u32)> {
+        if let Some(softened) = &self.softened {
+            return softened.last_broken();
+        }
         let last = self.last.iter();
         last.map(|&(i, bond)| (i, self.neighbours.get(i as usize, bond) as u32))
             .collect()
@@ -486,21 +529,29 @@ impl<const D: usize> BondPass<D> for List<D> {
     fn bonded(&self, i: usize, j: usize) -> bool {
         self.neighbours
             .place(i, self.offsets[i]..self.offsets[i + 1], j)
-            .is_some_and(|k| self.is_intact(i, k))
+            .is_some_and(|k| self.stands(i, self.offsets[i] + k))
     }
 
     fn damage_state(&self) -> Vec<u64> {
         if matches!(self.limit, Limit::Never) {
             return Vec::new();
         }
-        super::pack(&self.intact, self.reference)
+        let mut words = super::pack(&self.intact, self.reference);
+        words.extend(self.softened.iter().flat_map(SoftenedBonds::state));
+        words
     }
 
     fn restore_damage(&mut self, state: &[u64]) -> bool {
         if matches!(self.limit, Limit::Never) {
             return state.is_empty();
         }
-        super::unpack(state, self.reference, &mut self.intact)
+        let parts = SoftenedBonds::split(self.softened.as_ref(), state);
+        let whole =
+            parts.is_some_and(|(bits, _)| super::unpack(bits, self.reference, &mut self.intact));
+        if let (Some(softened), Some((_, bonds)), true) = (&mut self.softened, parts, whole) {
+            softened.restore(bonds);
+        }
+        whole
     }
 
     fn commit(&mut self) -> f64 {
@@ -512,7 +563,11 @@ impl<const D: usize> BondPass<D> for List<D> {
     }
 
     fn own_points(&mut self) -> Option<&mut dyn super::OwnPoints> {
-        Some(self)
+        // others would not know what has softened here
+        match self.softened {
+            Some(_) => None,
+            None => Some(self),
+        }
     }
 
     fn heated(&mut self) -> Option<&mut dyn super::HeatedBonds> {
@@ -539,5 +594,6 @@ impl<const D: usize> BondPass<D> for List<D> {
             + (self.offsets.len() + self.bytes.len()) * std::mem::size_of::<usize>()
             + self.neighbours.memory_bytes()
             + self.intact.len()
+            + (self.softened.as_ref()).map_or(0, SoftenedBonds::memory_bytes)
     }
 }

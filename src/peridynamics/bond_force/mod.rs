@@ -5,6 +5,7 @@
 //! | `force_problem.rs` | input of a pass, and the errors |
 //! | `kinematics.rs` | kinematics of bonds: exact, or to first order |
 //! | `stretch.rs` | one bond: stretch, force and extension without cancellation |
+//! | `softened_bonds.rs`, `lattice_softening.rs`, `list_softening.rs` | bonds between the onset of softening and their end |
 //! | `breaks.rs` | energy of the bonds that a pass broke |
 //! | `generic.rs`, `generic_tangent.rs` | the pass that any law takes, by its force states; its tangent at rest |
 //! | `point_forces.rs`, `point_state.rs`, `family_control.rs` | the same of correspondence, by a stress per point; its data; its zero-energy control |
@@ -25,7 +26,7 @@
 //! | `stencil.rs`, `stencil_numbers.rs` | the lattice's padded box, its offsets and bits; their weights |
 //! | `lattice_simd.rs` | the inner loops of the lattice pass |
 //! | `simd.rs` | eight numbers at a time, by the machine's widest instructions |
-//! | `reference_force.rs`, `tests.rs` | passes against a plain double loop |
+//! | `reference_force.rs`, `tests.rs`, `softening_tests.rs` | passes against a plain double loop |
 //!
 //! A bond is seen through `t = (2 ξ·η + η·η)/r²`, so that `|ξ + η| = r √(1 + t)`: no length is ever the difference of two long ones, and the stretch
 //! `s = √(1 + t) − 1` exceeds `s_c` exactly where `t > s_c (2 + s_c)`, without a root. Both ends of a bond compute the same `t` from the same numbers,
@@ -55,8 +56,10 @@ mod lattice_setup;
 // vector instructions: besides these two modules only `parallel.rs` has unsafe code
 #[allow(unsafe_code)]
 mod lattice_simd;
+mod lattice_softening;
 mod list;
 mod list_simd;
+mod list_softening;
 mod own_points;
 mod point_forces;
 #[cfg(test)]
@@ -68,6 +71,9 @@ mod reference_force;
 mod shared_rows;
 #[allow(unsafe_code)]
 mod simd;
+mod softened_bonds;
+#[cfg(test)]
+mod softening_tests;
 mod stencil;
 mod stencil_numbers;
 pub(super) mod stretch;
@@ -81,6 +87,7 @@ pub use force_problem::{
     Layout, Storage,
 };
 pub use kinematics::BondKinematics;
+pub use softened_bonds::BondSoftening;
 
 pub use stencil::BlockSetup;
 
@@ -89,7 +96,7 @@ pub(crate) use list::{extension, ratio, stretched};
 
 use crate::dimension;
 use crate::peridynamics::CauchyStress;
-use crate::system::{ExactSum, FailureUpdate, Interval};
+use crate::system::{BondChanges, ExactSum, FailureUpdate, Interval};
 use crate::tensor::Vector;
 
 /// One sweep over the bonds of a cloud.
@@ -107,14 +114,14 @@ pub trait BondPass<const D: usize>: Send + Sync {
     fn bonds(&self) -> u64;
 
     /// Overwrites `force` with the internal force `F(u, t, Δt)` (`K u` of a linear body, so minus the force that acts on the point), volume included; zero for points without a row.
-    /// Returns how many directed bonds this pass broke.
+    /// Returns how many directed bonds this pass broke, and how many it softened.
     fn force_into(
         &mut self,
         u: &[f64],
         force: &mut [f64],
         interval: Interval,
         breakage: FailureUpdate,
-    ) -> u64;
+    ) -> BondChanges;
 
     /// Ends the interval of the last call of [`BondPass::force_into`]: its history is the past of the next. Returns the energy that points with rows dissipated in it \[J\].
     fn commit(&mut self) -> f64;
@@ -279,6 +286,9 @@ fn pass<const D: usize>(setup: &BondSetup<'_, D>) -> Result<Box<dyn BondPass<D>>
         return Err(KernelError::NoFlow);
     }
     if let BondForce::Law { law, body } = setup.force {
+        if (setup.failure.as_ref()).is_some_and(|f| f.softening.is_some()) {
+            return Err(KernelError::Softening { law: law.name() });
+        }
         setup.check_bonds()?;
         let states = law
             .force_state()

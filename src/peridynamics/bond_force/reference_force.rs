@@ -133,6 +133,18 @@ pub(super) fn naive<const D: usize>(
     u: &[f64],
     intact: &dyn Fn(usize, usize) -> bool,
 ) -> (Vec<f64>, f64) {
+    let left = |i: usize, j: usize| [f64::from(u8::from(intact(i, j))); 2];
+    naive_of_parts(case, law, kinematics, u, &left)
+}
+
+/// The same where bonds have the parts `left(i, j)` of their stiffness, of the pair force and of the dilatation.
+pub(super) fn naive_of_parts<const D: usize>(
+    case: &Case<D>,
+    law: Law,
+    kinematics: BondKinematics,
+    u: &[f64],
+    left: &dyn Fn(usize, usize) -> [f64; 2],
+) -> (Vec<f64>, f64) {
     let points = case.position.len();
     let d = D as f64;
     let at = |i: usize| Vector::<D>::from_fn(|a, _| u[i * D + a]);
@@ -154,9 +166,7 @@ pub(super) fn naive<const D: usize>(
             let (xi, e, _) = geometry(i, j);
             let w = omega(i, 0, &xi) * case.volume[j];
             m[i] += w * xi.norm_squared();
-            if intact(i, j) {
-                theta[i] += w * xi.norm() * e;
-            }
+            theta[i] += left(i, j)[1] * w * xi.norm() * e;
         }
         if m[i] > 0.0 {
             theta[i] *= d / m[i];
@@ -164,13 +174,14 @@ pub(super) fn naive<const D: usize>(
     }
     let state = |i: usize, j: usize| {
         let (xi, e, _) = geometry(i, j);
+        let [pair, of_state] = left(i, j);
         match law {
-            Law::Pmb => coefficient(i, 0, &xi) * xi.norm_squared() * e,
+            Law::Pmb => pair * coefficient(i, 0, &xi) * xi.norm_squared() * e,
             Law::Solid if m[i] == 0.0 => 0.0,
             Law::Solid => {
                 omega(i, 0, &xi) / m[i]
-                    * ((d * BULK - (d + 2.0) * SHEAR) * theta[i] * xi.norm()
-                        + d * (d + 2.0) * SHEAR * e)
+                    * (of_state * (d * BULK - (d + 2.0) * SHEAR) * theta[i] * xi.norm()
+                        + pair * d * (d + 2.0) * SHEAR * e)
             }
         }
     };
@@ -178,19 +189,19 @@ pub(super) fn naive<const D: usize>(
     for i in (0..points).filter(|&i| case.rows[i]) {
         for &j in case.families.of(i) {
             let j = j as usize;
-            if !intact(i, j) {
-                continue;
-            }
             let (xi, e, direction) = geometry(i, j);
             let vv = case.volume[i] * case.volume[j];
             let f = direction * ((state(i, j) + state(j, i)) * vv);
             for a in 0..D {
                 force[i * D + a] -= f[a];
             }
-            energy += match law {
-                Law::Pmb => 0.5 * coefficient(i, 0, &xi) * xi.norm_squared() * e * e * vv,
-                Law::Solid => 0.5 * d * (d + 2.0) * SHEAR / m[i] * omega(i, 0, &xi) * e * e * vv,
-            };
+            energy += left(i, j)[0]
+                * match law {
+                    Law::Pmb => 0.5 * coefficient(i, 0, &xi) * xi.norm_squared() * e * e * vv,
+                    Law::Solid => {
+                        0.5 * d * (d + 2.0) * SHEAR / m[i] * omega(i, 0, &xi) * e * e * vv
+                    }
+                };
         }
         if law == Law::Solid {
             energy += 0.5 * (BULK - (d + 2.0) / d * SHEAR) * theta[i] * theta[i] * case.volume[i];

@@ -62,6 +62,7 @@ fn points_that_flow_under_a_constant_triaxiality_fail_at_the_integral_of_the_tea
         let failure = Failure {
             critical: BondCriterion::State(&criterion),
             no_fail: &[],
+            softening: None,
         };
         let check = |mut pass: Box<dyn BondPass<3>>| {
             let mut force = vec![0.0; case.position.len() * 3];

@@ -86,11 +86,16 @@ pub struct Fracture {
     pub criterion: &'static dyn FailureCriterion,
     /// The number that a scene types.
     pub value: f64,
+    /// Stretch at which a bond is through over that at which it begins to soften; 1 for bonds that break at once.
+    pub softening: f64,
+    /// True if a scene types that.
+    pub types_softening: bool,
 }
 
 impl PartialEq for Fracture {
     fn eq(&self, other: &Self) -> bool {
-        self.criterion.key() == other.criterion.key() && self.value == other.value
+        let numbers = |f: &Self| (f.value, f.softening);
+        self.criterion.key() == other.criterion.key() && numbers(self) == numbers(other)
     }
 }
 

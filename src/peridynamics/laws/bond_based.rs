@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Constants, NamedLaw, Parameter, Ratio};
+use super::{Constants, NamedLaw, Parameter, Ratio, SOFTENING};
 use crate::{
     material::{Kinematics, LocalLaw},
     peridynamics::{
@@ -46,7 +46,7 @@ impl<const D: usize> NamedLaw<D> for BondBased<D> {
     const ABOUT: &'static str = "Bonds that act alone; Poisson's ratio follows (1/3 in plane stress, 1/4 in plane strain and solids).";
     const RATIO: Ratio = Ratio::Pairwise;
     const KINEMATICS: &'static [Kinematics] = Kinematics::ALL;
-    const PARAMETERS: &'static [Parameter] = &[];
+    const PARAMETERS: &'static [Parameter] = &[SOFTENING];
 
     fn build(constants: Constants, _values: &[f64]) -> Arc<dyn Law<D>> {
         Arc::new(Self::new(constants.micromodulus, constants.shear))

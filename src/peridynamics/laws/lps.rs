@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Constants, NamedLaw, Parameter, Ratio};
+use super::{Constants, NamedLaw, Parameter, Ratio, SOFTENING};
 use crate::{
     material::{Kinematics, LocalLaw},
     peridynamics::{
@@ -49,7 +49,7 @@ impl<const D: usize> NamedLaw<D> for LinearPeridynamicSolid<D> {
         "Ordinary state-based law (linear peridynamic solid), any Poisson ratio.";
     const RATIO: Ratio = Ratio::Any;
     const KINEMATICS: &'static [Kinematics] = Kinematics::ALL;
-    const PARAMETERS: &'static [Parameter] = &[];
+    const PARAMETERS: &'static [Parameter] = &[SOFTENING];
 
     fn build(constants: Constants, _values: &[f64]) -> Arc<dyn Law<D>> {
         let (lambda, shear) = (constants.lambda, constants.shear);

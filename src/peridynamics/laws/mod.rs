@@ -104,6 +104,17 @@ impl Parameter {
     }
 }
 
+/// Softening of bonds that break by a fracture energy. By default a crack grows at the load that the energy stands for; bonds that break at once are trapped by the lattice, and want up to 1.4 times it (`bondline verify growth`).
+pub const SOFTENING: Parameter = Parameter {
+    key: "softening",
+    about: "Stretch at which a bond is through over that at which it begins to soften, with `fracture-energy`; 1 for bonds that break at once. 3 if left out, or 1 where bonds cannot soften.",
+    default: Some(3.0),
+    least: 1.0,
+    most: 1e3,
+    usual: 1.0,
+    words: &[],
+};
+
 /// Poisson ratios that a law has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ratio {

@@ -8,7 +8,7 @@ use crate::coupling::semidiscrete::behaviour::{
 use crate::coupling::semidiscrete::{CoupledSystem, masses};
 use crate::fem::Locator;
 use crate::observe::summary::Decision;
-use crate::peridynamics::bond_force::{BondKinematics, Storage};
+use crate::peridynamics::bond_force::{BondKinematics, BondSoftening, Storage};
 use crate::peridynamics::critical_stretch as failure_stretch;
 use crate::peridynamics::failure::{Fracture, Threshold};
 use crate::progress::Progress;
@@ -20,7 +20,7 @@ use crate::run::motion::material_stretches::{self, stretches_of_materials};
 use crate::run::motion::sharing::Sharing;
 use crate::run::setup::RunSettings;
 use crate::run::thermal::Thermal;
-use crate::scene::failure::Breaking;
+use crate::scene::failure::{Breaking, SofteningChoice};
 use crate::scene::initial::InitialKind;
 use crate::scene::region::Region;
 use crate::scene::spec::{BondsSpec, CalibrationSpec, PrecisionSpec};
@@ -80,8 +80,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
     let by_state = matches!(failure, Some(BondThreshold::State(_)));
     let can_fail_nowhere = |x: &_| breaking.no_fail.iter().any(|r| r.contains(x, 0.0));
     let is_linear = is_linear(model, rest, failure.as_ref());
-    let heat = rest.stresses.thermal.as_ref().filter(|_| !is_linear);
-    let heat = heat.map(Thermal::free_stretch);
+    let thermal = rest.stresses.thermal.as_ref().filter(|_| !is_linear);
     let rows = (model, operator, start.ranks);
     definiteness::check(rows, rest.ratio, choices, progress)?;
     let moving = CoupledSystem::of_processes(
@@ -92,13 +91,14 @@ pub(crate) fn dynamic<'a, const D: usize>(
         &BondBehaviour {
             kinematics,
             failure: failure.clone(),
+            softening: breaking.softening.softening(),
             no_fail: &can_fail_nowhere,
             contact: breaking.contact.map(|c| ContactBehaviour {
                 approach: c.radius_factor,
                 stiffness: c.stiffness_factor,
             }),
             storage,
-            heat: heat.clone(),
+            heat: thermal.map(Thermal::free_stretch),
             broken: start.broken,
         },
         start.ranks,
@@ -197,11 +197,22 @@ fn failure_text<const D: usize>(
         BondThreshold::ByMaterials(stretch) => stretches_of_materials(stretch, breaking),
         BondThreshold::State(state) => format!("bonds break at {state}"),
     });
+    let at_once = match breaking.softening {
+        SofteningChoice::AtOnceFor(why) => {
+            format!(
+                "; at once, since {why}: a crack grows at up to 1.3 times the load of its energy"
+            )
+        }
+        SofteningChoice::Soften(_) | SofteningChoice::AtOnce => String::new(),
+    };
     if let (Some(s), Some(_)) = (&stretches, &breaking.several) {
-        return s.clone();
+        return format!("{s}{at_once}");
     }
     match (stretches, breaking.fracture.and_then(Fracture::energy)) {
         (Some(s), Some(g)) => {
+            if let SofteningChoice::Soften(softening) = breaking.softening {
+                return softening_text(critical, softening, g, breaking.calibration);
+            }
             let takes = match breaking.calibration {
                 CalibrationSpec::Lattice => "bonds through a plane of the lattice take it",
                 CalibrationSpec::Continuum => "bonds through a plane of a continuous body take it",
@@ -214,7 +225,7 @@ fn failure_text<const D: usize>(
                 true => ", if at once, and less of it once they have relaxed",
                 false => "",
             };
-            format!("{s}, the fracture energy is {g:e}: {takes}{slowly}")
+            format!("{s}, the fracture energy is {g:e}: {takes}{slowly}{at_once}")
         }
         (Some(s), _) => s,
         (None, _) if breaking.damages => {
@@ -222,6 +233,25 @@ fn failure_text<const D: usize>(
         }
         (None, _) => "no bond breaks: no fracture-energy, no critical-stretch".to_owned(),
     }
+}
+
+/// Returns in words how bonds soften that would take the energy of a break at a `critical` stretch, that of the first lattice.
+fn softening_text(
+    critical: Option<&BondThreshold>,
+    softening: BondSoftening,
+    energy: f64,
+    calibration: CalibrationSpec,
+) -> String {
+    let brittle = critical.map_or(f64::NAN, |critical| critical.at(0, [0; 2]));
+    let from = softening.onset(brittle);
+    let takes = match calibration {
+        CalibrationSpec::Lattice => "planes of all directions take it in the mean",
+        CalibrationSpec::Continuum => "bonds through a plane of a continuous body take it",
+    };
+    format!(
+        "bonds soften along a line from the stretch {from:.3e} to {:.3e} and are through there, the fracture energy is {energy:e}: {takes}",
+        softening.ratio * from
+    )
 }
 
 /// Reports how bonds deform and break, and how they are stored.
@@ -235,14 +265,23 @@ fn tell_bonds<const D: usize>(
     choices: &mut Vec<Decision>,
 ) {
     if let Some((count, why)) = motion.distribution() {
+        let bonds = match motion.softens() {
+            true => {
+                "; each computes all bonds, since others would not know how far they have softened: softening = 1 shares them out"
+            }
+            false => "",
+        };
         choices.push(Decision {
             choice: format!("{count} processes"),
-            why: format!("each has the forces of its own sites, by {why}"),
+            why: format!("each has the forces of its own sites, by {why}{bonds}"),
         });
     }
     if model.body().is_some() {
         let at_seam = match (coupling.interface().faces, motion.has_seam_bonds()) {
             _ if is_linear => "",
+            (true, true) if motion.softens() => {
+                "; bonds that end on faces of elements break at once, with the same energy"
+            }
             (true, true) => ", as do bonds that end on faces of elements",
             (true, false) => "; within two horizons of the seam they are linear and do not break",
             _ => "",
@@ -343,6 +382,7 @@ pub(crate) fn still<'a, const D: usize>(
     let behaviour = BondBehaviour {
         kinematics,
         failure: None,
+        softening: None,
         no_fail: &|_| false,
         contact: None,
         storage: Storage::Double,
@@ -383,7 +423,13 @@ pub(crate) fn failure_criterion<const D: usize>(
         Threshold::Energy(energy) => energy,
     };
     let mut list = Vec::new();
-    for (horizon, per_square) in model.plane_energies()? {
+    // brittle bonds take it on planes along the lattice, where cracks of the papers run
+    let over_directions = match rest.breaking.softening.softening() {
+        Some(_) => model.mean_over_axis_planes()?,
+        None => Vec::new(),
+    };
+    for (lattice, (horizon, along_axes)) in model.plane_energies()?.into_iter().enumerate() {
+        let per_square = along_axes * over_directions.get(lattice).unwrap_or(&1.0);
         let Some(bonds) = p.law.bond_energy(horizon) else {
             return Err(SystemError::Law { law: p.law.name() }.into());
         };
@@ -410,14 +456,16 @@ pub(crate) fn failing_stretch<const D: usize>(
     if let Some(limit) = law.and_then(|law| law.calibrate()?.elastic_limit()) {
         return Ok(Some(limit));
     }
-    Ok(
-        failure_criterion(model, rest)?.and_then(|critical| match critical {
+    let softening = rest.breaking.softening.softening();
+    let begins = |brittle: f64| softening.map_or(brittle, |s| s.onset(brittle));
+    Ok(failure_criterion(model, rest)?
+        .and_then(|critical| match critical {
             BondThreshold::Uniform(s) => Some(s),
             BondThreshold::ByMaterials(of) => Some(of.smallest()).filter(|s| s.is_finite()),
             BondThreshold::PerLattice(list) => list.iter().copied().reduce(f64::min),
             BondThreshold::State(_) => None,
-        }),
-    )
+        })
+        .map(begins))
 }
 
 /// Returns the energy per area of opening a plane of the lattice at the critical stretch, and the fracture energy of the scene; none where nothing breaks, or where lattices differ.

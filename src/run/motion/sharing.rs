@@ -42,6 +42,8 @@ pub(crate) fn may_share<const D: usize>(problem: &Problem<D>, rest: &RunSettings
     problem.coupling.moves_with_own_families()
         // a criterion of a state reads bonds from both ends
         && rest.breaking.fracture.is_none_or(Fracture::is_of_stretch)
+        // how far a bond has softened is known where it is computed alone
+        && rest.breaking.softening.softening().is_none()
         && families_of_all(problem, rest).is_some()
 }
 

@@ -78,7 +78,7 @@ fn micromodulus<const D: usize>(material: &Material<D>, r: f64, horizon: f64) ->
     material.law.linearised().kernel(r, horizon)
 }
 
-/// The stretch at which bonds of a material break. A fracture energy that gives none is left to the run to refuse.
+/// The stretch at which bonds of a material break, or would if they did not soften. A fracture energy that gives none is left to the run to refuse.
 fn critical_stretch<const D: usize>(material: &Material<D>, horizon: f64) -> Option<f64> {
     let of_energy = |energy: f64| {
         let bonds = material.law.bond_energy(horizon).ok_or(())?;

@@ -300,6 +300,7 @@ fn a_scene_allocates_what_it_needs() {
         let behaviour = BondBehaviour {
             kinematics: BondKinematics::Linear,
             failure: critical_stretch.map(BondThreshold::Uniform),
+            softening: None,
             no_fail: &|_| false,
             contact: None,
             storage: crate::peridynamics::bond_force::Storage::Double,

@@ -97,7 +97,7 @@ fn block(lengths: &[u32], m: u32, material: &str, angle: f64) -> String {
         (of(-1.0), of(1.0))
     };
     format!(
-        "kinematics = \"{kinematics}\"\ncoupling = \"nonlocal\"\n[mesh.{mesh}]\nmin = {}\nmax = {}\n{}\n[materials.m.{material}\nyoungs-modulus = 1\nfracture-energy = {ENERGY:e}\n\
+        "kinematics = \"{kinematics}\"\ncoupling = \"nonlocal\"\n[mesh.{mesh}]\nmin = {}\nmax = {}\n{}\n[materials.m.{material}\nyoungs-modulus = 1\nfracture-energy = {ENERGY:e}\nsoftening = 1\n\
          [peridynamics]\nhorizon = {m}\npoints.lattice = {{ spacing = 1, origin = {} }}\n[conditions.behind.displacement]\n{behind}\n{}\n[conditions.ahead.displacement]\n{ahead}\n{}\n\
          [solve.quasi-static]\nsteps = {steps}\nduration = {steps}\noutputs = 1\n[output]\nvtu = false\n",
         corner(&|_| 0.0),
@@ -221,7 +221,7 @@ pub fn plate(coupling: &str, material: &str, fraction: f64) -> String {
     };
     format!(
         "kinematics = \"plane-stress\"\ncoupling = \"{coupling}\"\n{zones}[mesh.rectangle]\nmin = [0, 0]\nmax = [32, 24]\nx = {{ spacing = 1 }}\ny = {{ spacing = 1 }}\n\
-         [materials.m.{material}\nyoungs-modulus = 1\ndensity = 1\nfracture-energy = 1e-4\n[peridynamics]\nhorizon = 3\npoints.lattice = {{ spacing = 1, origin = [0.5, 0.5] }}\n\
+         [materials.m.{material}\nyoungs-modulus = 1\ndensity = 1\nfracture-energy = 1e-4\nsoftening = 1\n[peridynamics]\nhorizon = 3\npoints.lattice = {{ spacing = 1, origin = [0.5, 0.5] }}\n\
          [cracks]\nnotch = {{ segment = {{ from = [8, 12], to = [14, 12] }} }}\n\
          [conditions.top.velocity]\non = \"top\"\ny = \"0.003 * min(1, t / 40)\"\n[conditions.bottom.displacement]\non = \"bottom\"\ny = 0\n\
          [solve.explicit]\nduration = 110\nstep-fraction = {fraction}\noutputs = 1\n[output]\nvtu = false\n"
@@ -346,7 +346,7 @@ pub fn balances(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         let found: Vec<Vec<TableRow>> = bodies
             .map(|((name, text, mesh), (law, material))| {
                 closing(&format!("{name}, {law}"), true, |fraction| {
-                    let text = format!("{text}[materials.m.{material}\nyoungs-modulus = 1\ndensity = 1\nfracture-energy = 1e-4\n");
+                    let text = format!("{text}[materials.m.{material}\nyoungs-modulus = 1\ndensity = 1\nfracture-energy = 1e-4\nsoftening = 1\n");
                     let fraction = format!("solve.explicit.step-fraction={fraction}");
                     balance(&text, &[&fraction], &[("m.msh", mesh)])
                 })

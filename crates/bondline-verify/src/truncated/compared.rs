@@ -210,7 +210,6 @@ fn run_crack(
     let material = Material::Pairwise(Micromodulus::InverseDistance);
     let built = material.block::<2>(case, coupling, &crack(4.0 * SPACING, y));
     let e = built.map_err(|e| e.to_string())?;
-    let symmetry = e.coupling.symmetry();
     let operator = e.coupling.operator(&e.model).map_err(|e| e.to_string())?;
     let outside = 12.25 * SPACING;
     let never =
@@ -218,6 +217,7 @@ fn run_crack(
     let behaviour = BondBehaviour {
         kinematics: BondKinematics::Exact,
         failure: Some(BondThreshold::Uniform(CRITICAL)),
+        softening: None,
         no_fail: &never,
         contact: None,
         storage: bondline::peridynamics::bond_force::Storage::Double,
@@ -227,7 +227,7 @@ fn run_crack(
     let mut motion = CoupledSystem::new(
         &e.model,
         operator.as_ref(),
-        symmetry,
+        e.coupling.symmetry(),
         |_| DENSITY,
         &behaviour,
     )
