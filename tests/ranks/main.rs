@@ -77,7 +77,7 @@ fn cracks_run_alike_on_any_number_of_processes() {
     assert!(table.lines().count() > 3, "{table}");
 }
 
-/// How far a bond has softened is known to the process alone that computes it, so each computes all.
+/// Softened bonds are known to the process alone that computes them, so each computes all.
 #[test]
 fn so_do_those_whose_bonds_soften() {
     for (material, coupling) in [("bond-based", "truncated"), ("lps", "nonlocal")] {

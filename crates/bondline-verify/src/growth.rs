@@ -182,7 +182,7 @@ impl Quadratic {
         self.0[1] + 2.0 * self.0[2] * x
     }
 
-    /// Where it has a value, of a function that falls.
+    /// Argument of a value, of a function that falls.
     fn inverse(&self, y: f64) -> f64 {
         let (mut low, mut high) = (-10.0, 20.0);
         for _ in 0..60 {

@@ -117,7 +117,7 @@ impl SoftenedBonds {
         }
     }
 
-    /// How they soften.
+    /// Law of their softening.
     pub fn law(&self) -> BondSoftening {
         self.law
     }
