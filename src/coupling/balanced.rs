@@ -2,10 +2,9 @@
 
 use crate::{
     coupling::{
-        BlendingFunction, Coupling, Operator, Rows,
+        BlendingFunction, Operator,
         blending::{self, Blended, SpliceShare},
     },
-    dimension,
     mesh::Mesh,
     model::{CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout},
     peridynamics::{LinearForceState, PdBody},
@@ -57,13 +56,7 @@ impl<const D: usize> ZoneLayout<D> for Balanced {
     }
 }
 
-impl<const D: usize> Coupling<D> for Balanced {
-    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
-        static ROWS: (Rows<Balanced, 1>, Rows<Balanced, 2>, Rows<Balanced, 3>) =
-            (Balanced::rows, Balanced::rows, Balanced::rows);
-        dimension::of::<Rows<Self, D>>(&ROWS)(self, model)
-    }
-}
+coupling_by_rows!(Balanced);
 
 impl Balanced {
     fn rows<'a, const D: usize>(

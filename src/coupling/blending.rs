@@ -2,10 +2,7 @@
 
 use crate::{
     assembly::Row,
-    coupling::{
-        CellStresses, Coupling, Definiteness, ExactStresses, MixedRows, Operator, Rows, SeamBonds,
-    },
-    dimension,
+    coupling::{CellStresses, Definiteness, ExactStresses, MixedRows, Operator, SeamBonds},
     mesh::Mesh,
     model::{
         CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout,
@@ -72,12 +69,11 @@ impl<const D: usize> ZoneLayout<D> for Blending {
     }
 
     fn roles(&self, mesh: &Mesh<D>, zones: &[Zone], largest_horizon: f64) -> Vec<CellRole> {
-        match self.function {
-            BlendingFunction::Constant => {
-                with_collar(mesh, zones, Zone::Transition, largest_horizon * CLOSED)
-            }
-            _ => with_collar(mesh, zones, Zone::Transition, largest_horizon * OPEN),
-        }
+        let horizons = match self.function {
+            BlendingFunction::Constant => CLOSED,
+            _ => OPEN,
+        };
+        with_collar(mesh, zones, Zone::Transition, largest_horizon * horizons)
     }
 
     fn reach(&self, law: &dyn LinearForceState<D>) -> Reach {
@@ -93,13 +89,7 @@ impl<const D: usize> ZoneLayout<D> for Blending {
     }
 }
 
-impl<const D: usize> Coupling<D> for Blending {
-    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
-        static ROWS: (Rows<Blending, 1>, Rows<Blending, 2>, Rows<Blending, 3>) =
-            (Blending::rows, Blending::rows, Blending::rows);
-        dimension::of::<Rows<Self, D>>(&ROWS)(self, model)
-    }
-}
+coupling_by_rows!(Blending);
 
 impl Blending {
     fn rows<'a, const D: usize>(
@@ -136,21 +126,12 @@ pub(super) fn with_collar<const D: usize>(
 ) -> Vec<CellRole> {
     let filled = |c: usize| zones[c] == Zone::Nonlocal || zones[c] == outermost;
     let edge = Edge::of(mesh, filled);
-    (0..mesh.cell_count())
-        .map(|c| {
-            let near = || {
-                let nodes = mesh.cell(c).iter();
-                nodes
-                    .into_iter()
-                    .any(|&n| edge.within(&mesh.nodes[n as usize], reach))
-            };
-            if filled(c) || near() {
-                CellRole::Points
-            } else {
-                CellRole::Element
-            }
-        })
-        .collect()
+    let is_near = |&n: &u32| edge.within(&mesh.nodes[n as usize], reach);
+    let role = |c| match filled(c) || mesh.cell(c).iter().any(is_near) {
+        true => CellRole::Points,
+        false => CellRole::Element,
+    };
+    (0..mesh.cell_count()).map(role).collect()
 }
 
 /// β of [SAND2015-7998] eq. (3.9) at every point of the cloud: 1 in the nonlocal zone, 0 in the local one, `function` in between or, without one, 0.
@@ -216,17 +197,13 @@ impl<'a, const D: usize> Blended<'a, D> {
             if family.iter().all(|&j| beta[i] + beta[j as usize] == 2.0) {
                 return Ok(None);
             }
-            let neighbours: Vec<(u32, Vector<D>)> = family
-                .iter()
-                .map(|&j| (j, body.bond(i, j as usize)))
-                .collect();
-            match least_squares_gradient::quadratic(model.spacing(), &neighbours) {
-                Some(weights) => Ok(Some(weights)),
-                None => Err(ModelError::Derivative {
-                    position: body.cloud.position[i].iter().copied().collect(),
-                    bonds: family.len(),
-                }),
-            }
+            let bond = |&j: &u32| (j, body.bond(i, j as usize));
+            let neighbours: Vec<(u32, Vector<D>)> = family.iter().map(bond).collect();
+            let weights = least_squares_gradient::quadratic(model.spacing(), &neighbours);
+            weights.map(Some).ok_or_else(|| ModelError::Derivative {
+                position: body.cloud.position[i].iter().copied().collect(),
+                bonds: family.len(),
+            })
         })?;
         Ok(Self {
             model,

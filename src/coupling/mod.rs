@@ -25,6 +25,27 @@
 //! cells around every site and (b) places outside a site's own region whose displacement is interpolated exactly for affine fields.
 //! A method is one file with a [`Coupling`], one line here and its entry in the scene.
 
+/// Implements [`Coupling`] by the function `rows` of a method, compiled here for one, two and three dimensions.
+macro_rules! coupling_by_rows {
+    ($method:ident) => {
+        impl<const D: usize> $crate::coupling::Coupling<D> for $method {
+            fn operator<'a>(
+                &self,
+                model: &'a Model<D>,
+            ) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+                type Rows<const D: usize> =
+                    for<'a> fn(
+                        &$method,
+                        &'a Model<D>,
+                    ) -> Result<Box<dyn Operator<D> + 'a>, ModelError>;
+                static ROWS: (Rows<1>, Rows<2>, Rows<3>) =
+                    ($method::rows, $method::rows, $method::rows);
+                $crate::dimension::of::<Rows<D>>(&ROWS)(self, model)
+            }
+        }
+    };
+}
+
 pub mod balanced;
 pub mod blending;
 mod cauchy_born;
@@ -74,10 +95,6 @@ pub trait Coupling<const D: usize>: ZoneLayout<D> {
     /// [`ModelError`] if the method cannot be applied to this model, with the remedy.
     fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError>;
 }
-
-/// [`Coupling::operator`] of the method `C` in `D` dimensions.
-type Rows<C, const D: usize> =
-    for<'a> fn(&C, &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError>;
 
 /// Evidence that the energy behind symmetric rows is never negative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

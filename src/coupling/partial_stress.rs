@@ -2,10 +2,7 @@
 
 use crate::{
     assembly::Row,
-    coupling::{
-        CellStresses, Coupling, Definiteness, ExactStresses, MixedRows, Operator, Rows, SeamBonds,
-    },
-    dimension,
+    coupling::{CellStresses, Definiteness, ExactStresses, MixedRows, Operator, SeamBonds},
     mesh::Mesh,
     model::{
         CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout,
@@ -74,20 +71,7 @@ impl<const D: usize> ZoneLayout<D> for PartialStressMeshfree {
     }
 }
 
-impl<const D: usize> Coupling<D> for PartialStressMeshfree {
-    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
-        static ROWS: (
-            Rows<PartialStressMeshfree, 1>,
-            Rows<PartialStressMeshfree, 2>,
-            Rows<PartialStressMeshfree, 3>,
-        ) = (
-            PartialStressMeshfree::rows,
-            PartialStressMeshfree::rows,
-            PartialStressMeshfree::rows,
-        );
-        dimension::of::<Rows<Self, D>>(&ROWS)(self, model)
-    }
-}
+coupling_by_rows!(PartialStressMeshfree);
 
 impl PartialStressMeshfree {
     fn rows<'a, const D: usize>(

@@ -5,10 +5,7 @@ use std::sync::Arc;
 use crate::coupling::partial_stress_fit::{FamilyFit, shapes};
 use crate::{
     assembly::Row,
-    coupling::{
-        CellStresses, Coupling, Definiteness, ExactStresses, MixedRows, Operator, Rows, SeamBonds,
-    },
-    dimension,
+    coupling::{CellStresses, Definiteness, ExactStresses, MixedRows, Operator, SeamBonds},
     fem::{self, QuadraturePoint},
     mesh::Mesh,
     model::{CellRole, FitDegree, Interface, Model, ModelError, Reach, Zone, ZoneLayout},
@@ -68,20 +65,7 @@ impl<const D: usize> ZoneLayout<D> for PartialStressElements {
     }
 }
 
-impl<const D: usize> Coupling<D> for PartialStressElements {
-    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
-        static ROWS: (
-            Rows<PartialStressElements, 1>,
-            Rows<PartialStressElements, 2>,
-            Rows<PartialStressElements, 3>,
-        ) = (
-            PartialStressElements::rows,
-            PartialStressElements::rows,
-            PartialStressElements::rows,
-        );
-        dimension::of::<Rows<Self, D>>(&ROWS)(self, model)
-    }
-}
+coupling_by_rows!(PartialStressElements);
 
 impl PartialStressElements {
     fn rows<'a, const D: usize>(

@@ -1,6 +1,6 @@
 //! Isotropic linear elasticity.
 
-use super::{Kinematics, LocalHistory, LocalLaw, LocalResponse, MaterialError};
+use super::{Banded, Kinematics, LocalHistory, LocalLaw, LocalResponse, MaterialError};
 use crate::tensor::{Tensor, Tensor4};
 
 /// An isotropic, linearly elastic solid, validated.
@@ -163,6 +163,10 @@ impl<const D: usize> LocalLaw<D> for LinearElastic<D> {
 
     fn has_symmetric_tangent(&self) -> bool {
         true
+    }
+
+    fn in_band(&self, _width: f64) -> Option<Banded<D>> {
+        None
     }
 
     fn respond(

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{LocalHistory, LocalLaw, LocalResponse, WideBand, reduction::with_unnamed};
+use super::{Banded, LocalHistory, LocalLaw, LocalResponse, reduction::with_unnamed};
 use crate::tensor::{Tensor, Tensor4};
 
 /// History variables of a point beside those of its law: the free stretch s that it is given, `1 + s` at the end of the last step (0 before the first), `∂W/∂s` there, and the work of heating.
@@ -67,7 +67,7 @@ impl LocalLaw<3> for Expanding {
         self.history
     }
 
-    fn in_band(&self, width: f64) -> Option<Result<Arc<dyn LocalLaw<3>>, WideBand>> {
+    fn in_band(&self, width: f64) -> Option<Banded<3>> {
         let banded = |law| -> Arc<dyn LocalLaw<3>> { Arc::new(Self::new(law)) };
         Some(self.law.in_band(width)?.map(banded))
     }

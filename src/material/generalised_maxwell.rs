@@ -1,7 +1,7 @@
 //! The linear viscoelastic solid: a Prony series of the shear modulus, an elastic bulk.
 
 use super::prony::{PronySeries, PronyStep};
-use super::{LocalHistory, LocalLaw, LocalResponse};
+use super::{Banded, LocalHistory, LocalLaw, LocalResponse};
 use crate::tensor::{Tensor, Tensor4, strain};
 
 /// Components of a strain that are remembered: xx, xy, xz, yy, yz, zz.
@@ -94,6 +94,10 @@ impl LocalLaw<3> for GeneralisedMaxwell {
 
     fn has_symmetric_tangent(&self) -> bool {
         true
+    }
+
+    fn in_band(&self, _width: f64) -> Option<Banded<3>> {
+        None
     }
 
     fn respond(

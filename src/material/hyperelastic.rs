@@ -1,6 +1,6 @@
 //! Hyperelastic solids, for displacement gradients of any size.
 
-use super::{LocalHistory, LocalLaw, LocalResponse};
+use super::{Banded, LocalHistory, LocalLaw, LocalResponse};
 use crate::tensor::{Tensor, Tensor4, inverse};
 
 fn delta(i: usize, j: usize) -> f64 {
@@ -67,6 +67,10 @@ impl LocalLaw<3> for StVenantKirchhoff {
 
     fn has_symmetric_tangent(&self) -> bool {
         true
+    }
+
+    fn in_band(&self, _width: f64) -> Option<Banded<3>> {
+        None
     }
 
     fn respond(
@@ -163,6 +167,10 @@ impl LocalLaw<3> for NeoHooke {
 
     fn has_symmetric_tangent(&self) -> bool {
         true
+    }
+
+    fn in_band(&self, _width: f64) -> Option<Banded<3>> {
+        None
     }
 
     fn respond(

@@ -1,6 +1,6 @@
 //! Von Mises plasticity with isotropic hardening, for small strains.
 
-use super::{Hardening, Kinematics, LocalHistory, LocalLaw, LocalResponse};
+use super::{Banded, Hardening, Kinematics, LocalHistory, LocalLaw, LocalResponse};
 use crate::tensor::{Tensor, Tensor4, strain};
 
 /// J2 plasticity: `σ = C : (ε − ε_p)`, `f = √(3/2) |dev σ| − σ_y(α) ≤ 0`, `ε̇_p = α̇ √(3/2) dev σ/|dev σ|`, with the yield stress of [`Hardening`].
@@ -206,6 +206,10 @@ impl<const D: usize> LocalLaw<D> for J2<D> {
 
     fn has_symmetric_tangent(&self) -> bool {
         true
+    }
+
+    fn in_band(&self, _width: f64) -> Option<Banded<D>> {
+        None
     }
 
     fn respond(

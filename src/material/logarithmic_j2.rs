@@ -1,6 +1,6 @@
 //! Von Mises plasticity for strains and rotations of any size, in logarithmic strains.
 
-use super::{Hardening, J2, LocalHistory, LocalLaw, LocalResponse};
+use super::{Banded, Hardening, J2, LocalHistory, LocalLaw, LocalResponse};
 use crate::tensor::{Tensor, Tensor4, Vector, inverse, strain};
 
 /// J2 plasticity in logarithmic strains: `F = F_e F_p`, `ε_e = ½ ln b_e`, `b_e = F_e F_eᵀ = F C_p⁻¹ Fᵀ`, and [`J2`] between the elastic strain `ε_e` and the Kirchhoff stress `τ = C : ε_e`.
@@ -210,6 +210,10 @@ impl LocalLaw<3> for LogarithmicJ2 {
 
     fn has_symmetric_tangent(&self) -> bool {
         true
+    }
+
+    fn in_band(&self, _width: f64) -> Option<Banded<3>> {
+        None
     }
 
     fn respond(

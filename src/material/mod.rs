@@ -162,6 +162,9 @@ pub struct WideBand {
     pub energy: f64,
 }
 
+/// The law in such a band, or the reason against it.
+pub type Banded<const D: usize> = Result<Arc<dyn LocalLaw<D>>, WideBand>;
+
 /// Response of a local law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalResponse<const D: usize> {
@@ -277,9 +280,7 @@ pub trait LocalLaw<const D: usize>: Send + Sync + std::fmt::Debug {
     ) -> LocalResponse<D>;
 
     /// The law where its deformation localises in a band of the width `width` \[m\]: of a law whose softening takes an energy per area, so that what it does at a point depends on that length. None of a law without one.
-    fn in_band(&self, _width: f64) -> Option<Result<Arc<dyn LocalLaw<D>>, WideBand>> {
-        None
-    }
+    fn in_band(&self, width: f64) -> Option<Banded<D>>;
 
     /// The algorithmic tangent `C_ijkl = ∂P_ij/∂G_kl` of [`LocalLaw::respond`] \[Pa\], with which Newton's method converges quadratically; where it has a kink, at the onset of flow, that of either side.
     /// Not a number where there is no response. A law that says nothing has the central differences of its response, `2 D²` of them.

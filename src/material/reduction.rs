@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::{Kinematics, LocalHistory, LocalLaw, LocalResponse, WideBand};
+use super::{Banded, Kinematics, LocalHistory, LocalLaw, LocalResponse};
 use crate::tensor::{Tensor, Tensor4};
 
 /// Number of history variables of a point up to which they take no memory of their own.
@@ -211,7 +211,7 @@ impl<const D: usize> LocalLaw<D> for Reduced<D> {
         self.history
     }
 
-    fn in_band(&self, width: f64) -> Option<Result<Arc<dyn LocalLaw<D>>, WideBand>> {
+    fn in_band(&self, width: f64) -> Option<Banded<D>> {
         let banded = |law| -> Arc<dyn LocalLaw<D>> {
             Arc::new(Self {
                 law,
@@ -390,6 +390,10 @@ mod tests {
 
         fn history(&self) -> LocalHistory {
             LocalHistory::of(&NUMBERS)
+        }
+
+        fn in_band(&self, _width: f64) -> Option<Banded<3>> {
+            None
         }
 
         fn respond(

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Envelope, LocalHistory, LocalLaw, LocalResponse, WideBand};
+use super::{Banded, Envelope, LocalHistory, LocalLaw, LocalResponse, WideBand};
 use crate::tensor::{Tensor, Tensor4, strain};
 
 /// The part of the stiffness that is left of a material that is damaged through: it holds the nodes of its cells in place, and bears a millionth of what the whole material would.
@@ -155,7 +155,7 @@ impl LocalLaw<3> for ScalarDamage {
         }
     }
 
-    fn in_band(&self, width: f64) -> Option<Result<Arc<dyn LocalLaw<3>>, WideBand>> {
+    fn in_band(&self, width: f64) -> Option<Banded<3>> {
         let law = self.banded(width);
         Some(law.map(|law| Arc::new(law) as Arc<dyn LocalLaw<3>>))
     }

@@ -1,7 +1,7 @@
 //! Algorithmic tangents of every law along paths that load, flow, unload and turn, beside central differences of its stress.
 
 use super::tests::laws;
-use super::{Hardening, JohnsonCook, Kinematics, LocalLaw, LogarithmicJ2, Reduced};
+use super::{Banded, Hardening, JohnsonCook, Kinematics, LocalLaw, LogarithmicJ2, Reduced};
 use crate::tensor::{Tensor, Tensor4};
 use std::sync::Arc;
 
@@ -162,6 +162,10 @@ fn differences_serve_a_law_without_a_closed_form() {
         fn flows_at_constant_volume(&self) -> bool {
             false
         }
+        fn in_band(&self, _width: f64) -> Option<Banded<3>> {
+            None
+        }
+
         fn respond(
             &self,
             gradient: &Tensor<3>,

@@ -132,7 +132,7 @@ pub trait ZoneLayout<const D: usize>: Send + Sync {
         false
     }
 
-    /// Returns true if its rows hold the products of dilatations and deviatoric extensions of a law with [`LinearForceState::has_deviators`]; any other coupling is refused for such a law.
+    /// Returns true if its rows hold the products of dilatations and deviatoric extensions of a law that is [`OrdinaryWithDeviators`](crate::peridynamics::ForceStateKind::OrdinaryWithDeviators); any other coupling is refused for such a law.
     fn takes_deviators(&self) -> bool {
         false
     }

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use super::bond_force::{BondKinematics, stretch::psi};
 use crate::{
-    material::{LocalHistory, LocalLaw, LocalResponse, central_differences},
+    material::{Banded, LocalHistory, LocalLaw, LocalResponse, central_differences},
     peridynamics::{Accelerator, EnergyDensity, Law, MemorylessFamily, StatePart},
     tensor::{Tensor, Tensor4, Vector, determinant},
 };
@@ -256,6 +256,10 @@ impl<const D: usize> LocalLaw<D> for CauchyBorn<D> {
     fn has_symmetric_tangent(&self) -> bool {
         // without memory, the stress follows from the energy of the family
         true
+    }
+
+    fn in_band(&self, _width: f64) -> Option<Banded<D>> {
+        None
     }
 
     fn respond(

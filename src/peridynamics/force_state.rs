@@ -221,9 +221,7 @@ pub trait ForceState<const D: usize>: Send + Sync {
     }
 
     /// The stress of a point, of a law whose [`ForceState::respond`] is that and nothing else: the pass then evaluates it once per point instead of a force per bond. `material` is that of the point; none asks whether all of them have one control.
-    fn correspondence(&self, _material: Option<u16>) -> Option<PointStress<'_, D>> {
-        None
-    }
+    fn correspondence(&self, material: Option<u16>) -> Option<PointStress<'_, D>>;
 
     /// Returns true if a family that has lost bonds still has a response; if not, its point carries no stress of its own. Runs report the number of such points.
     fn responds(&self, _family: &DeformedFamily<'_, D>) -> bool {

@@ -52,10 +52,8 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
     /// The nonlinear response; none for a law that is known to first order only, whose bonds neither rotate nor break.
     fn force_state(&self) -> Option<&dyn ForceState<D>>;
 
-    /// A fast pass for [`Law::force_state`], if there is one.
-    fn accelerator(&self) -> Option<Accelerator> {
-        None
-    }
+    /// A fast pass for [`Law::force_state`], if there is one: of a law without it the bonds that a seam cuts stay linear.
+    fn accelerator(&self) -> Option<Accelerator>;
 
     /// The local law that finite elements of this material have; none if they are linear, with the collapsed tensor of the bonds.
     fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>>;
@@ -70,18 +68,22 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
     /// Returns true if bonds can break: [`Law::force_state`] then takes families that have lost some.
     fn has_breakable_bonds(&self) -> bool;
 
-    /// Returns the calibration of its constants to the lattice at hand, if they follow from it.
-    fn calibrate(&self) -> Option<&dyn Calibrate<D>> {
-        None
-    }
-
-    /// The laws of its materials, if it stands for several.
-    fn several(&self) -> Option<&dyn Mixture<D>> {
-        None
-    }
+    /// Returns the origin of its constants.
+    fn parameters(&self) -> Parameters<'_, D>;
 
     /// Returns the energy stored in the bonds of a continuous family, and the energy of breaking them, to second order in the stretch, if that is known in closed form; `horizon` is δ \[m\].
     fn bond_energy(&self, horizon: f64) -> Option<BondEnergy>;
+}
+
+/// Origin of the constants of a law.
+#[derive(Clone, Copy)]
+pub enum Parameters<'a, const D: usize> {
+    /// Those that the law is made with.
+    Typed,
+    /// The lattice at hand, to which they are calibrated.
+    OfLattice(&'a dyn Calibrate<D>),
+    /// The materials of a mixture.
+    OfMaterials(&'a dyn Mixture<D>),
 }
 
 /// Range in which the force of a law with linear kinematics is that of its linearisation.
@@ -96,6 +98,22 @@ pub enum Linearity {
 }
 
 impl<const D: usize> dyn Law<D> + '_ {
+    /// Returns the calibration of its constants to the lattice at hand, if they follow from it.
+    pub fn calibrate(&self) -> Option<&dyn Calibrate<D>> {
+        match self.parameters() {
+            Parameters::OfLattice(calibrate) => Some(calibrate),
+            _ => None,
+        }
+    }
+
+    /// The laws of its materials, if it stands for several.
+    pub fn several(&self) -> Option<&dyn Mixture<D>> {
+        match self.parameters() {
+            Parameters::OfMaterials(mixture) => Some(mixture),
+            _ => None,
+        }
+    }
+
     /// Returns true if the force with linear kinematics is linear at any displacement and time.
     pub fn is_linear(&self) -> bool {
         self.linearity() == Linearity::Always

@@ -71,23 +71,26 @@ pub enum StressFit {
     Quadratic,
 }
 
+/// Kinds of force states, by what the force of a bond depends on and by its direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ForceStateKind {
+    /// Bonds act independently of each other and along themselves: there is no state part.
+    BondBased,
+    /// The force of a bond points along it and depends on its family.
+    Ordinary,
+    /// The same with a [`StatePart::deviator`], which not every coupling can represent.
+    OrdinaryWithDeviators,
+    /// The force of a bond has any direction.
+    NonOrdinary,
+}
+
 /// A law linearised at rest: seams, linear statics and preconditioners are made from it.
 pub trait LinearForceState<const D: usize>: Send + Sync {
-    /// Returns true if bonds act independently of each other (no state part).
-    fn is_pairwise(&self) -> bool;
-
-    /// Returns true if the force of a bond points along it.
-    fn is_ordinary(&self) -> bool;
-
-    /// Returns true if its state parts have a [`StatePart::deviator`], which not every coupling can represent.
-    fn has_deviators(&self) -> bool {
-        false
-    }
+    /// Returns the kind of force state.
+    fn kind(&self) -> ForceStateKind;
 
     /// The law with coefficients that make the partial stress exact under affine fields on families that are no lattice's, where [`LinearForceState::coefficients`] does not, and no factors of [`LinearForceState::moment_conditions`] can.
-    fn fitted_to(&self, _stress: StressFit) -> Option<Box<dyn LinearForceState<D> + '_>> {
-        None
-    }
+    fn fitted_to(&self, stress: StressFit) -> Option<Box<dyn LinearForceState<D> + '_>>;
 
     /// ω of the divergence of a meshfree partial stress beside this law.
     fn divergence(&self) -> Influence;
@@ -119,6 +122,23 @@ pub trait LinearForceState<const D: usize>: Send + Sync {
         pair: &mut [f64],
         omega: &mut [f64],
     ) -> Result<Option<StatePart<D>>, PdError>;
+}
+
+impl<const D: usize> dyn LinearForceState<D> + '_ {
+    /// Returns true if bonds act independently of each other (no state part).
+    pub fn is_pairwise(&self) -> bool {
+        self.kind() == ForceStateKind::BondBased
+    }
+
+    /// Returns true if the force of a bond points along it.
+    pub fn is_ordinary(&self) -> bool {
+        self.kind() != ForceStateKind::NonOrdinary
+    }
+
+    /// Returns true if its state parts have a [`StatePart::deviator`].
+    pub fn has_deviators(&self) -> bool {
+        self.kind() == ForceStateKind::OrdinaryWithDeviators
+    }
 }
 
 /// The classical tensor that a family really carries: `ν⁰ = C : G` under `u = G x`.

@@ -74,13 +74,14 @@ pub use force_state::{
 pub use horizon::Horizon;
 pub use influence::{Influence, Micromodulus};
 pub use lattice_families::Wanted;
-pub use law::{Accelerator, Calibrate, Law, Linearity, Mixture};
+pub use law::{Accelerator, Calibrate, Law, Linearity, Mixture, Parameters};
 pub use laws::{
     BondBased, Correspondence, Hardening, LinearPeridynamicSolid, Maxwell, NoMixture,
     PositionAwareSolid, Several, StiffnessMean,
 };
 pub use linear_force_state::{
-    Family, FamilyMaterials, LinearForceState, StatePart, StressFit, collapsed_tensor,
+    Family, FamilyMaterials, ForceStateKind, LinearForceState, StatePart, StressFit,
+    collapsed_tensor,
 };
 pub use memoryless_family::MemorylessFamily;
 pub use moment_fitted_weights::{Bound, FitError, MomentConditions};

@@ -324,6 +324,10 @@ impl Drive for Still<'_> {
     fn displacement_into(&self, _time: f64, values: &mut [f64]) {
         values.copy_from_slice(&self.values);
     }
+
+    fn velocity_into(&self, _time: f64, values: &mut [f64]) {
+        values.fill(0.0);
+    }
 }
 
 /// Equilibrium of forces that are not linear, by Newton's method: the solution, its internal forces and its energy.

@@ -71,6 +71,10 @@ impl Drive for Pulled {
     fn displacement_into(&self, time: f64, values: &mut [f64]) {
         values.copy_from_slice(&[0.0, time]);
     }
+
+    fn velocity_into(&self, _time: f64, values: &mut [f64]) {
+        values.fill(0.0);
+    }
 }
 
 /// Load steps at these times.
@@ -183,6 +187,10 @@ impl Drive for Grip {
         if matches!(self, Self::Displacement) {
             values[1] = time;
         }
+    }
+
+    fn velocity_into(&self, _time: f64, values: &mut [f64]) {
+        values.fill(0.0);
     }
 }
 

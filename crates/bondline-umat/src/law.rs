@@ -9,7 +9,7 @@ use std::{
 };
 
 use bondline::material::{
-    LocalHistory, LocalLaw, LocalResponse, UmatEnergies, UmatSettings, differenced_tangent,
+    Banded, LocalHistory, LocalLaw, LocalResponse, UmatEnergies, UmatSettings, differenced_tangent,
 };
 use bondline::tensor::{Tensor, Tensor4, determinant, inverse, strain};
 
@@ -424,6 +424,10 @@ impl LocalLaw<3> for Umat {
     fn failure(&self) -> Option<String> {
         let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
         failure.clone()
+    }
+
+    fn in_band(&self, _width: f64) -> Option<Banded<3>> {
+        None
     }
 
     fn respond(

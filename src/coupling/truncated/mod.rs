@@ -57,10 +57,7 @@ use crate::coupling::truncated::{
 };
 use crate::{
     assembly::Row,
-    coupling::{
-        CellStresses, Coupling, Definiteness, ExactStresses, MixedRows, Operator, Rows, SeamBonds,
-    },
-    dimension,
+    coupling::{CellStresses, Definiteness, ExactStresses, MixedRows, Operator, SeamBonds},
     mesh::Mesh,
     model::{
         CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout,
@@ -129,13 +126,7 @@ impl<const D: usize> ZoneLayout<D> for Truncated {
     }
 }
 
-impl<const D: usize> Coupling<D> for Truncated {
-    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
-        static ROWS: (Rows<Truncated, 1>, Rows<Truncated, 2>, Rows<Truncated, 3>) =
-            (Truncated::rows, Truncated::rows, Truncated::rows);
-        dimension::of::<Rows<Self, D>>(&ROWS)(self, model)
-    }
-}
+coupling_by_rows!(Truncated);
 
 impl Truncated {
     fn rows<'a, const D: usize>(

@@ -1,14 +1,11 @@
 //! The rows of truncated families: gradients of an energy.
 
 use crate::assembly::Row;
-use crate::dimension;
 use crate::mesh::Mesh;
 use crate::peridynamics::LinearForceState;
 use crate::system::Symmetry;
 use crate::{
-    coupling::{
-        CellStresses, Coupling, Definiteness, ExactStresses, MixedRows, Operator, Rows, SeamBonds,
-    },
+    coupling::{CellStresses, Definiteness, ExactStresses, MixedRows, Operator, SeamBonds},
     model::{CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout},
 };
 
@@ -44,20 +41,7 @@ impl<const D: usize> ZoneLayout<D> for TruncatedFamilies {
     }
 }
 
-impl<const D: usize> Coupling<D> for TruncatedFamilies {
-    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
-        static ROWS: (
-            Rows<TruncatedFamilies, 1>,
-            Rows<TruncatedFamilies, 2>,
-            Rows<TruncatedFamilies, 3>,
-        ) = (
-            TruncatedFamilies::rows,
-            TruncatedFamilies::rows,
-            TruncatedFamilies::rows,
-        );
-        dimension::of::<Rows<Self, D>>(&ROWS)(self, model)
-    }
-}
+coupling_by_rows!(TruncatedFamilies);
 
 impl TruncatedFamilies {
     fn rows<'a, const D: usize>(

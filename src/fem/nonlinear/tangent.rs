@@ -125,8 +125,8 @@ mod tests {
     use super::*;
     use crate::fem::sample::{boxes, noise};
     use crate::material::{
-        Hardening, J2, Kinematics, LocalHistory, LocalResponse, LogarithmicJ2, NeoHooke, Reduced,
-        StVenantKirchhoff,
+        Banded, Hardening, J2, Kinematics, LocalHistory, LocalResponse, LogarithmicJ2, NeoHooke,
+        Reduced, StVenantKirchhoff,
     };
 
     const LAME: (f64, f64) = (600.0, 400.0);
@@ -154,6 +154,10 @@ mod tests {
 
         fn flows_at_constant_volume(&self) -> bool {
             true
+        }
+
+        fn in_band(&self, _width: f64) -> Option<Banded<3>> {
+            None
         }
 
         fn respond(

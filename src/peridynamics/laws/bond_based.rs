@@ -7,8 +7,9 @@ use crate::{
     material::{Kinematics, LocalLaw},
     peridynamics::{
         Accelerator, BondEnergy, DeformedFamily, Departure, EnergyDensity, Family, ForceState,
-        HistoryLayout, Influence, Law, LinearForceState, Linearity, Micromodulus, MomentConditions,
-        Past, PdError, Present, ShellTarget, StatePart,
+        ForceStateKind, HistoryLayout, Influence, Law, LinearForceState, Linearity, Micromodulus,
+        MomentConditions, Parameters, Past, PdError, PointStress, Present, ShellTarget, StatePart,
+        StressFit,
         influence::{Alpha, Degree},
     },
     tensor::{Tensor, Tensor4, Vector},
@@ -86,6 +87,10 @@ impl<const D: usize> Law<D> for BondBased<D> {
         true
     }
 
+    fn parameters(&self) -> Parameters<'_, D> {
+        Parameters::Typed
+    }
+
     fn bond_energy(&self, horizon: f64) -> Option<BondEnergy> {
         let c1111 = self.tensor.get(0, 0, 0, 0);
         Some(BondEnergy::Pairwise {
@@ -96,12 +101,12 @@ impl<const D: usize> Law<D> for BondBased<D> {
 }
 
 impl<const D: usize> LinearForceState<D> for BondBased<D> {
-    fn is_pairwise(&self) -> bool {
-        true
+    fn kind(&self) -> ForceStateKind {
+        ForceStateKind::BondBased
     }
 
-    fn is_ordinary(&self) -> bool {
-        true
+    fn fitted_to(&self, _stress: StressFit) -> Option<Box<dyn LinearForceState<D> + '_>> {
+        None
     }
 
     fn divergence(&self) -> Influence {
@@ -178,6 +183,10 @@ impl<const D: usize> ForceState<D> for BondBased<D> {
             stored,
             dissipated: 0.0,
         }
+    }
+
+    fn correspondence(&self, _material: Option<u16>) -> Option<PointStress<'_, D>> {
+        None
     }
 
     fn is_objective(&self) -> bool {

@@ -6,9 +6,9 @@ use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::{Kinematics, LocalLaw},
     peridynamics::{
-        BondEnergy, DeformedFamily, Departure, EnergyDensity, ForceState, HistoryLayout,
-        KeptDamage, Law, LinearForceState, Linearity, Micromodulus, Past, Present,
-        departure::DAMAGED_ELEMENTS,
+        Accelerator, BondEnergy, DeformedFamily, Departure, EnergyDensity, ForceState,
+        HistoryLayout, KeptDamage, Law, LinearForceState, Linearity, Micromodulus, Parameters,
+        Past, PointStress, Present, departure::DAMAGED_ELEMENTS,
     },
     tensor::{Tensor, Vector},
 };
@@ -132,6 +132,10 @@ impl<const D: usize> Law<D> for ContinuumDamage<D> {
         Some(self)
     }
 
+    fn accelerator(&self) -> Option<Accelerator> {
+        None
+    }
+
     fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
         None
     }
@@ -162,6 +166,10 @@ impl<const D: usize> Law<D> for ContinuumDamage<D> {
     /// Not at a stretch: they break by their damage.
     fn has_breakable_bonds(&self) -> bool {
         false
+    }
+
+    fn parameters(&self) -> Parameters<'_, D> {
+        Parameters::Typed
     }
 
     fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {
@@ -342,6 +350,10 @@ impl<const D: usize> ForceState<D> for ContinuumDamage<D> {
             energy.stored += 0.5 * t * e * family.volumes[k];
         }
         energy
+    }
+
+    fn correspondence(&self, _material: Option<u16>) -> Option<PointStress<'_, D>> {
+        None
     }
 
     fn is_objective(&self) -> bool {

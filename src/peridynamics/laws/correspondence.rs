@@ -6,8 +6,9 @@ use super::{Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::{Kinematics, LocalLaw},
     peridynamics::{
-        BondEnergy, Departure, Family, ForceState, Influence, Law, LinearForceState, Linearity,
-        MomentConditions, PdError, ShellTarget, StatePart, ZeroEnergyControl, invert_shape_tensor,
+        Accelerator, BondEnergy, Departure, Family, ForceState, ForceStateKind, Influence, Law,
+        LinearForceState, Linearity, MomentConditions, Parameters, PdError, ShellTarget, StatePart,
+        StressFit, ZeroEnergyControl, invert_shape_tensor,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -94,6 +95,10 @@ impl<const D: usize> Law<D> for Correspondence<D> {
         None
     }
 
+    fn accelerator(&self) -> Option<Accelerator> {
+        None
+    }
+
     fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
         None
     }
@@ -110,18 +115,22 @@ impl<const D: usize> Law<D> for Correspondence<D> {
         false
     }
 
+    fn parameters(&self) -> Parameters<'_, D> {
+        Parameters::Typed
+    }
+
     fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {
         None
     }
 }
 
 impl<const D: usize> LinearForceState<D> for Correspondence<D> {
-    fn is_pairwise(&self) -> bool {
-        false
+    fn kind(&self) -> ForceStateKind {
+        ForceStateKind::NonOrdinary
     }
 
-    fn is_ordinary(&self) -> bool {
-        false
+    fn fitted_to(&self, _stress: StressFit) -> Option<Box<dyn LinearForceState<D> + '_>> {
+        None
     }
 
     fn divergence(&self) -> Influence {

@@ -6,9 +6,9 @@ use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::{Kinematics, LocalLaw},
     peridynamics::{
-        BondEnergy, DeformedFamily, Departure, EnergyDensity, ForceState, HistoryLayout, Law,
-        LinearForceState, Linearity, Micromodulus, Past, Present, departure::stretch_of_cubic,
-        largest_extension,
+        Accelerator, BondEnergy, DeformedFamily, Departure, EnergyDensity, ForceState,
+        HistoryLayout, Law, LinearForceState, Linearity, Micromodulus, Parameters, Past,
+        PointStress, Present, departure::stretch_of_cubic, largest_extension,
     },
     tensor::{Tensor, Vector},
 };
@@ -59,6 +59,10 @@ impl<const D: usize> Law<D> for Hardening<D> {
         Some(self)
     }
 
+    fn accelerator(&self) -> Option<Accelerator> {
+        None
+    }
+
     fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
         None
     }
@@ -78,6 +82,10 @@ impl<const D: usize> Law<D> for Hardening<D> {
 
     fn has_breakable_bonds(&self) -> bool {
         true
+    }
+
+    fn parameters(&self) -> Parameters<'_, D> {
+        Parameters::Typed
     }
 
     fn bond_energy(&self, horizon: f64) -> Option<BondEnergy> {
@@ -110,6 +118,10 @@ impl<const D: usize> ForceState<D> for Hardening<D> {
             stored,
             dissipated: 0.0,
         }
+    }
+
+    fn correspondence(&self, _material: Option<u16>) -> Option<PointStress<'_, D>> {
+        None
     }
 
     fn is_objective(&self) -> bool {

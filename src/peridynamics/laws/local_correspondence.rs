@@ -6,9 +6,9 @@ use super::{Correspondence, Parameter};
 use crate::{
     material::LocalLaw,
     peridynamics::{
-        BondEnergy, Calibrate, CauchyStress, DeformedFamily, Departure, EnergyDensity, ForceState,
-        HistoryLayout, KeptDamage, Law, LinearForceState, Linearity, Past, PointStress, Present,
-        ZeroEnergyControl,
+        Accelerator, BondEnergy, Calibrate, CauchyStress, DeformedFamily, Departure, EnergyDensity,
+        ForceState, HistoryLayout, KeptDamage, Law, LinearForceState, Linearity, Parameters, Past,
+        PointStress, Present, ZeroEnergyControl,
         bond_force::{conjugate, felt},
         departure,
         shape_tensor::spanned_inverse,
@@ -77,6 +77,10 @@ impl<const D: usize> Law<D> for LocalCorrespondence<D> {
         Some(self)
     }
 
+    fn accelerator(&self) -> Option<Accelerator> {
+        None
+    }
+
     fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
         Some(Arc::clone(&self.local))
     }
@@ -94,11 +98,11 @@ impl<const D: usize> Law<D> for LocalCorrespondence<D> {
         self.local.history().damage.is_none()
     }
 
-    fn calibrate(&self) -> Option<&dyn Calibrate<D>> {
-        self.local
-            .history()
-            .damage
-            .map(|_| self as &dyn Calibrate<D>)
+    fn parameters(&self) -> Parameters<'_, D> {
+        match self.local.history().damage {
+            Some(_) => Parameters::OfLattice(self),
+            None => Parameters::Typed,
+        }
     }
 
     fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {

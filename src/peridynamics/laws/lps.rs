@@ -7,8 +7,9 @@ use crate::{
     material::{Kinematics, LocalLaw},
     peridynamics::{
         Accelerator, BondEnergy, DeformedFamily, Departure, EnergyDensity, Family, ForceState,
-        HistoryLayout, Influence, Law, LinearForceState, Linearity, MomentConditions, Past,
-        PdError, Present, ShellTarget, StatePart, moment_fitted_weights,
+        ForceStateKind, HistoryLayout, Influence, Law, LinearForceState, Linearity,
+        MomentConditions, Parameters, Past, PdError, PointStress, Present, ShellTarget, StatePart,
+        StressFit, moment_fitted_weights,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -93,6 +94,10 @@ impl<const D: usize> Law<D> for LinearPeridynamicSolid<D> {
         true
     }
 
+    fn parameters(&self) -> Parameters<'_, D> {
+        Parameters::Typed
+    }
+
     fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {
         Some(BondEnergy::Lps {
             influence: self.influence,
@@ -103,12 +108,12 @@ impl<const D: usize> Law<D> for LinearPeridynamicSolid<D> {
 }
 
 impl<const D: usize> LinearForceState<D> for LinearPeridynamicSolid<D> {
-    fn is_pairwise(&self) -> bool {
-        false
+    fn kind(&self) -> ForceStateKind {
+        ForceStateKind::Ordinary
     }
 
-    fn is_ordinary(&self) -> bool {
-        true
+    fn fitted_to(&self, _stress: StressFit) -> Option<Box<dyn LinearForceState<D> + '_>> {
+        None
     }
 
     fn divergence(&self) -> Influence {
@@ -204,6 +209,10 @@ impl<const D: usize> ForceState<D> for LinearPeridynamicSolid<D> {
             stored: stored + 0.5 * modulus * theta * theta,
             dissipated: 0.0,
         }
+    }
+
+    fn correspondence(&self, _material: Option<u16>) -> Option<PointStress<'_, D>> {
+        None
     }
 
     fn is_objective(&self) -> bool {

@@ -6,8 +6,9 @@ use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::{Arm, Kinematics, LocalLaw},
     peridynamics::{
-        BondEnergy, DeformedFamily, Departure, EnergyDensity, ForceState, HistoryLayout, Law,
-        LinearForceState, Linearity, Micromodulus, Past, Present,
+        Accelerator, BondEnergy, DeformedFamily, Departure, EnergyDensity, ForceState,
+        HistoryLayout, Law, LinearForceState, Linearity, Micromodulus, Parameters, Past,
+        PointStress, Present,
     },
     tensor::{Tensor, Vector},
 };
@@ -73,6 +74,10 @@ impl<const D: usize> Law<D> for Maxwell<D> {
         Some(self)
     }
 
+    fn accelerator(&self) -> Option<Accelerator> {
+        None
+    }
+
     fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
         None
     }
@@ -90,6 +95,10 @@ impl<const D: usize> Law<D> for Maxwell<D> {
 
     fn has_breakable_bonds(&self) -> bool {
         true
+    }
+
+    fn parameters(&self) -> Parameters<'_, D> {
+        Parameters::Typed
     }
 
     fn bond_energy(&self, horizon: f64) -> Option<BondEnergy> {
@@ -133,6 +142,10 @@ impl<const D: usize> ForceState<D> for Maxwell<D> {
             energy.dissipated += weight * self.share * spent;
         }
         energy
+    }
+
+    fn correspondence(&self, _material: Option<u16>) -> Option<PointStress<'_, D>> {
+        None
     }
 
     fn is_objective(&self) -> bool {

@@ -6,9 +6,10 @@ use super::{Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::{Kinematics, LocalLaw},
     peridynamics::{
-        BondEnergy, CalibrationFields, DeformedFamily, Departure, EnergyDensity, Family,
-        ForceState, HistoryLayout, Influence, Law, LinearForceState, Linearity, MomentConditions,
-        Past, PdError, Present, ShellTarget, StatePart, StressFit,
+        Accelerator, BondEnergy, CalibrationFields, DeformedFamily, Departure, EnergyDensity,
+        Family, ForceState, ForceStateKind, HistoryLayout, Influence, Law, LinearForceState,
+        Linearity, MomentConditions, Parameters, Past, PdError, PointStress, Present, ShellTarget,
+        StatePart, StressFit,
         position_aware_influence::{self, PositionAware},
     },
     tensor::{Tensor, Tensor4, Vector},
@@ -144,6 +145,10 @@ impl<const D: usize> Law<D> for PositionAwareSolid<D> {
         Some(self)
     }
 
+    fn accelerator(&self) -> Option<Accelerator> {
+        None
+    }
+
     fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
         None
     }
@@ -160,6 +165,10 @@ impl<const D: usize> Law<D> for PositionAwareSolid<D> {
         true
     }
 
+    fn parameters(&self) -> Parameters<'_, D> {
+        Parameters::Typed
+    }
+
     fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {
         // a continuous complete family is that of an LPS
         Some(BondEnergy::Lps {
@@ -171,16 +180,8 @@ impl<const D: usize> Law<D> for PositionAwareSolid<D> {
 }
 
 impl<const D: usize> LinearForceState<D> for PositionAwareSolid<D> {
-    fn is_pairwise(&self) -> bool {
-        false
-    }
-
-    fn is_ordinary(&self) -> bool {
-        true
-    }
-
-    fn has_deviators(&self) -> bool {
-        true
+    fn kind(&self) -> ForceStateKind {
+        ForceStateKind::OrdinaryWithDeviators
     }
 
     fn fitted_to(&self, stress: StressFit) -> Option<Box<dyn LinearForceState<D> + '_>> {
@@ -229,16 +230,12 @@ struct FittedStress<'a, const D: usize> {
 }
 
 impl<const D: usize> LinearForceState<D> for FittedStress<'_, D> {
-    fn is_pairwise(&self) -> bool {
-        self.law.is_pairwise()
+    fn kind(&self) -> ForceStateKind {
+        self.law.kind()
     }
 
-    fn is_ordinary(&self) -> bool {
-        self.law.is_ordinary()
-    }
-
-    fn has_deviators(&self) -> bool {
-        self.law.has_deviators()
+    fn fitted_to(&self, _stress: StressFit) -> Option<Box<dyn LinearForceState<D> + '_>> {
+        None
     }
 
     fn divergence(&self) -> Influence {
@@ -313,6 +310,10 @@ impl<const D: usize> ForceState<D> for PositionAwareSolid<D> {
             stored,
             dissipated: 0.0,
         }
+    }
+
+    fn correspondence(&self, _material: Option<u16>) -> Option<PointStress<'_, D>> {
+        None
     }
 
     fn is_objective(&self) -> bool {

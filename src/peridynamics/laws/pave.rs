@@ -7,8 +7,9 @@ use super::{Constants, NamedLaw, Parameter, PositionAwareSolid, Ratio, relaxing}
 use crate::{
     material::{Kinematics, LocalLaw, PronySeries},
     peridynamics::{
-        BondEnergy, CauchyStress, DeformedFamily, Departure, EnergyDensity, ForceState,
-        HistoryLayout, Law, LinearForceState, Linearity, Past, Present, departure,
+        Accelerator, BondEnergy, CauchyStress, DeformedFamily, Departure, EnergyDensity,
+        ForceState, HistoryLayout, Law, LinearForceState, Linearity, Parameters, Past, PointStress,
+        Present, departure,
     },
     tensor::{Tensor, Vector},
 };
@@ -100,6 +101,10 @@ impl<const D: usize> Law<D> for PositionAwareViscoelasticSolid<D> {
         Some(self)
     }
 
+    fn accelerator(&self) -> Option<Accelerator> {
+        None
+    }
+
     fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
         Some(Arc::clone(&self.local))
     }
@@ -114,6 +119,10 @@ impl<const D: usize> Law<D> for PositionAwareViscoelasticSolid<D> {
 
     fn has_breakable_bonds(&self) -> bool {
         true
+    }
+
+    fn parameters(&self) -> Parameters<'_, D> {
+        Parameters::Typed
     }
 
     fn bond_energy(&self, horizon: f64) -> Option<BondEnergy> {
@@ -182,6 +191,10 @@ impl<const D: usize> ForceState<D> for PositionAwareViscoelasticSolid<D> {
             tensor,
             across: trace.map(|trace| trace / family.volume_ratio() - tensor.trace()),
         }
+    }
+
+    fn correspondence(&self, _material: Option<u16>) -> Option<PointStress<'_, D>> {
+        None
     }
 
     fn is_objective(&self) -> bool {

@@ -6,8 +6,9 @@ use crate::{
     material::LocalLaw,
     peridynamics::{
         Accelerator, BondEnergy, CauchyStress, DeformedFamily, Departure, EnergyDensity, Family,
-        ForceState, HistoryLayout, Influence, Law, LinearForceState, Linearity, Mixture,
-        MomentConditions, Past, PdError, PointStress, Present, ShellTarget, StatePart,
+        ForceState, ForceStateKind, HistoryLayout, Influence, Law, LinearForceState, Linearity,
+        Mixture, MomentConditions, Parameters, Past, PdError, PointStress, Present, ShellTarget,
+        StatePart, StressFit,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -161,7 +162,7 @@ impl<const D: usize> Mixture<D> for Several<D> {
     }
 
     fn relative(&self, own: u16, far: u16) -> f64 {
-        match self.is_pairwise() {
+        match self.first().linearised().is_pairwise() {
             true => self.relative[usize::from(own) * self.laws.len() + usize::from(far)],
             false => 1.0,
         }
@@ -227,8 +228,8 @@ impl<const D: usize> Law<D> for Several<D> {
         self.in_use().all(|law| law.has_breakable_bonds())
     }
 
-    fn several(&self) -> Option<&dyn Mixture<D>> {
-        Some(self)
+    fn parameters(&self) -> Parameters<'_, D> {
+        Parameters::OfMaterials(self)
     }
 
     fn bond_energy(&self, _horizon: f64) -> Option<BondEnergy> {
@@ -238,16 +239,12 @@ impl<const D: usize> Law<D> for Several<D> {
 }
 
 impl<const D: usize> LinearForceState<D> for Several<D> {
-    fn is_pairwise(&self) -> bool {
-        self.first().linearised().is_pairwise()
+    fn kind(&self) -> ForceStateKind {
+        self.first().linearised().kind()
     }
 
-    fn is_ordinary(&self) -> bool {
-        self.first().linearised().is_ordinary()
-    }
-
-    fn has_deviators(&self) -> bool {
-        self.first().linearised().has_deviators()
+    fn fitted_to(&self, _stress: StressFit) -> Option<Box<dyn LinearForceState<D> + '_>> {
+        None
     }
 
     fn divergence(&self) -> Influence {

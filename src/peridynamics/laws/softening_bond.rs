@@ -6,8 +6,9 @@ use super::{BondBased, Constants, NamedLaw, Parameter, Ratio};
 use crate::{
     material::{Kinematics, LocalLaw},
     peridynamics::{
-        BondEnergy, Calibrate, DeformedFamily, Departure, EnergyDensity, ForceState, HistoryLayout,
-        KeptDamage, Law, LinearForceState, Linearity, Micromodulus, Past, Present,
+        Accelerator, BondEnergy, Calibrate, DeformedFamily, Departure, EnergyDensity, ForceState,
+        HistoryLayout, KeptDamage, Law, LinearForceState, Linearity, Micromodulus, Parameters,
+        Past, PointStress, Present,
         departure::DAMAGED_ELEMENTS,
         largest_extension,
         softening::{Calibration, CalibrationError, Envelope, RegularFamily, Softening},
@@ -89,6 +90,10 @@ impl<const D: usize> Law<D> for SofteningBond<D> {
         Some(self)
     }
 
+    fn accelerator(&self) -> Option<Accelerator> {
+        None
+    }
+
     fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
         None
     }
@@ -117,8 +122,8 @@ impl<const D: usize> Law<D> for SofteningBond<D> {
         None
     }
 
-    fn calibrate(&self) -> Option<&dyn Calibrate<D>> {
-        Some(self)
+    fn parameters(&self) -> Parameters<'_, D> {
+        Parameters::OfLattice(self)
     }
 }
 
@@ -192,6 +197,10 @@ impl<const D: usize> ForceState<D> for SofteningBond<D> {
             energy.stored += 0.5 * left * stiffness * s * s;
         }
         energy
+    }
+
+    fn correspondence(&self, _material: Option<u16>) -> Option<PointStress<'_, D>> {
+        None
     }
 
     fn is_objective(&self) -> bool {

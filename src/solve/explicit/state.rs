@@ -15,17 +15,13 @@ pub trait Drive: Sync {
     }
 
     /// The dofs whose displacement is prescribed, ascending.
-    fn prescribed(&self) -> &[u32] {
-        &[]
-    }
+    fn prescribed(&self) -> &[u32];
 
     /// Overwrites `values` with the displacements \[m\] of [`Drive::prescribed`] at `time`.
-    fn displacement_into(&self, _time: f64, _values: &mut [f64]) {}
+    fn displacement_into(&self, time: f64, values: &mut [f64]);
 
     /// Overwrites `values` with the velocities \[m/s\] of [`Drive::prescribed`] at `time`; asked for at the start only.
-    fn velocity_into(&self, _time: f64, values: &mut [f64]) {
-        values.fill(0.0);
-    }
+    fn velocity_into(&self, time: f64, values: &mut [f64]);
 }
 
 /// No load and nothing prescribed.
@@ -40,6 +36,14 @@ impl Drive for Undriven {
     fn is_steady(&self) -> bool {
         true
     }
+
+    fn prescribed(&self) -> &[u32] {
+        &[]
+    }
+
+    fn displacement_into(&self, _time: f64, _values: &mut [f64]) {}
+
+    fn velocity_into(&self, _time: f64, _values: &mut [f64]) {}
 }
 
 /// All that changes in a motion, but for the damage, which the system keeps ([`BodyHistory::damage_state`](crate::system::BodyHistory::damage_state)): both together resume a run bit for bit.

@@ -50,6 +50,24 @@ impl Drive for Shaken {
     }
 }
 
+/// A force on one dof, without supports.
+struct Load(usize, fn(f64) -> f64);
+
+impl Drive for Load {
+    fn load_into(&self, time: f64, load: &mut [f64]) {
+        load.fill(0.0);
+        load[self.0] = (self.1)(time);
+    }
+
+    fn prescribed(&self) -> &[u32] {
+        &[]
+    }
+
+    fn displacement_into(&self, _time: f64, _values: &mut [f64]) {}
+
+    fn velocity_into(&self, _time: f64, _values: &mut [f64]) {}
+}
+
 #[test]
 fn a_mode_oscillates_at_the_frequency_of_the_scheme() {
     // free chain, mode cos(k π (i + ½)/n) with ω² = 4 sin²(kπ/2n); Verlet turns ω into (2/Δt) asin(ω Δt/2)
@@ -162,16 +180,10 @@ fn momentum_of_a_free_chain_stays_and_an_observer_stops_the_run() {
 
 #[test]
 fn a_load_that_begins_at_zero_is_no_runaway() {
-    struct Swelling;
-    impl Drive for Swelling {
-        fn load_into(&self, time: f64, load: &mut [f64]) {
-            load.fill(0.0);
-            load[0] = (0.01 * time).sin();
-        }
-    }
+    let swelling = Load(0, |time| (0.01 * time).sin());
     let mut system = chain(5);
     let params = ExplicitParams::with_step(0.5);
-    let mut motion = Explicit::new(&mut system, &Swelling, params, State::at_rest(5)).unwrap();
+    let mut motion = Explicit::new(&mut system, &swelling, params, State::at_rest(5)).unwrap();
     motion.run(2, &mut |_| ControlFlow::Continue(())).unwrap();
     // v(Δt) = ½ Δt sin(0.01 Δt), v(2 Δt) = Δt sin(0.01 Δt) + ½ Δt sin(0.02 Δt) but for the spring, which is Δt² smaller
     let wanted = 0.5 * 0.005f64.sin() + 0.25 * 0.01f64.sin();
@@ -205,14 +217,8 @@ fn trouble_is_named() {
     }
     let error = go(0.5, State::at_rest(n + 1), &Undriven).expect_err("another model");
     assert!(matches!(error, ExplicitError::Shape { .. }), "{error}");
-    struct Late;
-    impl Drive for Late {
-        fn load_into(&self, time: f64, load: &mut [f64]) {
-            load.fill(0.0);
-            load[7] = if time > 9.9 { f64::NAN } else { 1.0 };
-        }
-    }
-    let error = go(0.5, State::at_rest(n), &Late).expect_err("not a number");
+    let late = Load(7, |time| if time > 9.9 { f64::NAN } else { 1.0 });
+    let error = go(0.5, State::at_rest(n), &late).expect_err("not a number");
     assert!(
         matches!(
             error,
