@@ -26,9 +26,9 @@ impl<const D: usize> Model<D> {
         for (c, local) in self.cells_of_site(site).filter(|(c, _)| takes(*c)) {
             self.add_element_row(c, local, 1.0, row);
         }
-        for &tied in self.followers_of_site(site) {
+        for &(tied, weight) in self.followers_of_site(site) {
             for (c, local) in self.cells_of_node(tied).filter(|(c, _)| takes(*c)) {
-                self.add_element_row(c, local, 0.5, row);
+                self.add_element_row(c, local, weight, row);
             }
         }
     }

@@ -96,7 +96,7 @@ fn point_at<const D: usize>(
     }
 }
 
-/// Calls `visit` with each quadrature point of cell `c`, without allocating.
+/// Calls `visit` with each quadrature point of cell `c`, without allocating; of a cut cell with those of the part that belongs to the body.
 ///
 /// Precondition: the mesh has passed [`super::check`]. A cell that no element can live on has no points.
 pub fn for_each_point<const D: usize>(
@@ -109,7 +109,12 @@ pub fn for_each_point<const D: usize>(
         return;
     };
     let (origin, x) = relative_nodes(mesh, c);
-    for (xi, w) in cell.rule(rule) {
+    let points = match (mesh.embedded.cut_cell(c), rule) {
+        (None, _) => cell.rule(rule),
+        (Some(cut), Rule::Stiffness) => &cut.stiffness,
+        (Some(cut), Rule::Mass) => &cut.mass,
+    };
+    for (xi, w) in points {
         visit(&point_at(cell, &origin, &x, xi, *w));
     }
 }

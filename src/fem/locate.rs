@@ -155,7 +155,8 @@ impl<const D: usize> Locator<D> {
             let holds = |c: usize| {
                 let (low, high) = bounding_box(mesh, c);
                 let inside = (0..D).all(|i| x[i] > low[i] && x[i] < high[i]);
-                (inside && is_box(mesh, c, &low, &high)) || located(mesh, c, x, tolerance).is_some()
+                (inside && is_box(mesh, c, &low, &high) && !mesh.embedded.is_taken(c, x))
+                    || located(mesh, c, x, tolerance).is_some()
             };
             is_held = is_held || cells.iter().any(|&c| holds(c as usize));
         });
@@ -249,7 +250,8 @@ fn located<const D: usize>(
     let (low, high) = bounding_box(mesh, c);
     // twice, because the box of a skew cell is larger than its extent along a reference axis is short
     let margin = 2.0 * tolerance * (high - low).amax();
-    if (0..D).any(|i| x[i] < low[i] - margin || x[i] > high[i] + margin) {
+    let is_beyond = (0..D).any(|i| x[i] < low[i] - margin || x[i] > high[i] + margin);
+    if is_beyond || mesh.embedded.is_taken(c, x) {
         return None;
     }
     let cell = reference(mesh, c)?;

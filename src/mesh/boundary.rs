@@ -34,7 +34,7 @@ pub struct InterfaceFacet {
 }
 
 /// Sorted node numbers of a facet, padded: the same for all cells that share it.
-fn key(nodes: impl Iterator<Item = u32>) -> [u32; 4] {
+pub(super) fn key(nodes: impl Iterator<Item = u32>) -> [u32; 4] {
     let mut k = [u32::MAX; 4];
     k.iter_mut().zip(nodes).for_each(|(k, n)| *k = n);
     k.sort_unstable();
@@ -120,9 +120,13 @@ impl<const D: usize> Mesh<D> {
         alone.map(|facet| self.facet(facet)).collect()
     }
 
-    /// The facets that belong to exactly one cell of the whole mesh.
+    /// The facets that belong to exactly one cell of the whole mesh, but those within the body where a patch is embedded.
     pub fn outer_facets(&self) -> Vec<BoundaryFacet> {
-        self.boundary_facets(0..self.cell_count() as u32)
+        let mut facets = self.boundary_facets(0..self.cell_count() as u32);
+        if !self.embedded.inner.is_empty() {
+            facets.retain(|facet| !self.embedded.inner.contains(&facet.key::<D>()));
+        }
+        facets
     }
 
     /// For each cell whether it touches the boundary of the mesh, with a facet, an edge or a corner.

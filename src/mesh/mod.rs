@@ -17,6 +17,7 @@
 //! | `conformity.rs` | conformity of cells, which have to meet face to face |
 //! | `visibility.rs` | bonds that leave the mesh |
 //! | `dilate_erode.rs` | sets of cells that grow and shrink |
+//! | `embedded.rs` | cut cells and nodes that follow others, around an embedded patch |
 //! | `order.rs` | cells of first and second order: corners, mid-side nodes, from the one to the other |
 //! | `error.rs` | errors of a mesh or its file |
 
@@ -26,6 +27,7 @@ pub mod boundary;
 mod cell_shape;
 mod conformity;
 mod dilate_erode;
+mod embedded;
 mod error;
 pub mod generate;
 pub mod gmsh;
@@ -45,6 +47,7 @@ mod vtu_data;
 mod xml;
 
 pub use cell_shape::CellShape;
+pub use embedded::{Covered, CutCell, CutRule, Embedded};
 pub use error::{MeshError, Place};
 pub use order::{Order, Tie, facet_corners};
 pub use parts::MeshParts;
@@ -76,6 +79,8 @@ pub struct Mesh<const D: usize> {
     pub node_sets: BTreeMap<String, Vec<u32>>,
     /// Notes on what the reader of its file left out, a sentence each.
     pub notes: Vec<String>,
+    /// Cut cells and nodes that follow others.
+    pub embedded: Embedded<D>,
 }
 
 impl<const D: usize> Default for Mesh<D> {
@@ -89,6 +94,7 @@ impl<const D: usize> Default for Mesh<D> {
             facet_sets: BTreeMap::new(),
             node_sets: BTreeMap::new(),
             notes: Vec::new(),
+            embedded: Embedded::default(),
         }
     }
 }

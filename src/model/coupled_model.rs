@@ -46,7 +46,7 @@ pub struct Model<const D: usize> {
     pub(crate) lattices: ModelLattices<D>,
     /// Cells around every node: where those of each begin, and their numbers.
     pub(crate) node_cells: (Vec<u32>, Vec<u32>),
-    /// Nodes in the middle of edges that follow the ends of their edge.
+    /// Nodes that follow others.
     pub(crate) ties: Ties,
     /// Places at the seam.
     pub(crate) interface: Interface,
@@ -248,17 +248,17 @@ impl<const D: usize> Model<D> {
             })
     }
 
-    /// The nodes in the middle of edges that follow a site by half, see [`mesh::Tie`](crate::mesh::Tie); none of a point.
-    pub fn followers_of_site(&self, site: usize) -> &[u32] {
+    /// The nodes that follow a site, with its weight in each: those in the middle of edges, see [`mesh::Tie`](crate::mesh::Tie), and around an embedded patch; none of a point.
+    pub fn followers_of_site(&self, site: usize) -> &[(u32, f64)] {
         match self.sites[site].kind {
             SiteKind::Node(n) => self.ties.followers(n),
             SiteKind::Point(_) => &[],
         }
     }
 
-    /// The ends of its edge that a node in the middle follows, by half each, see [`mesh::Tie`](crate::mesh::Tie); none of a free node.
-    pub fn followed_ends(&self, node: u32) -> Option<[u32; 2]> {
-        self.ties.ends(node)
+    /// The nodes that a node follows, with their weights: in the middle of an edge the ends of this, see [`mesh::Tie`](crate::mesh::Tie); none of a free node.
+    pub fn followed_nodes(&self, node: u32) -> Option<&[(u32, f64)]> {
+        self.ties.followed(node)
     }
 
     /// Returns true if the rows and loads of the nodes around a cell contain its share: where elements overlap into the peridynamic region, those of all cells do.

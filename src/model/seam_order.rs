@@ -53,42 +53,53 @@ pub(crate) fn linear_at_seam<const D: usize>(
     Ok(mesh)
 }
 
-/// Nodes in the middle of edges that follow the ends of these.
+/// Nodes that follow others: in the middle of an edge the ends of this, around an embedded patch the nodes beyond its edge.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Ties {
-    ends: FxHashMap<u32, [u32; 2]>,
-    of_end: FxHashMap<u32, Vec<u32>>,
+    followed: FxHashMap<u32, Vec<(u32, f64)>>,
+    followers: FxHashMap<u32, Vec<(u32, f64)>>,
 }
 
 impl Ties {
     pub fn new<const D: usize>(mesh: &Mesh<D>) -> Self {
         let mut ties = Self::default();
+        for (&node, followed) in &mesh.embedded.followers {
+            ties.add(node, followed.clone());
+        }
         for tie in mesh.ties() {
-            ties.ends.insert(tie.node, tie.ends);
-            for end in tie.ends {
-                ties.of_end.entry(end).or_default().push(tie.node);
-            }
+            ties.add(tie.node, tie.ends.map(|end| (end, 0.5)).to_vec());
         }
         ties
     }
 
-    /// The nodes that a node follows, half each; none if it is free.
-    pub fn ends(&self, node: u32) -> Option<[u32; 2]> {
-        self.ends.get(&node).copied()
+    fn add(&mut self, node: u32, followed: Vec<(u32, f64)>) {
+        for &(other, weight) in &followed {
+            self.followers.entry(other).or_default().push((node, weight));
+        }
+        self.followed.insert(node, followed);
     }
 
-    /// The nodes that follow a node by half.
-    pub fn followers(&self, node: u32) -> &[u32] {
-        if self.of_end.is_empty() {
+    /// The nodes that a node follows, with their weights; none if it is free.
+    pub fn followed(&self, node: u32) -> Option<&[(u32, f64)]> {
+        match self.followed.is_empty() {
+            true => None,
+            false => self.followed.get(&node).map(Vec::as_slice),
+        }
+    }
+
+    /// The nodes that follow a node, with its weight in each.
+    pub fn followers(&self, node: u32) -> &[(u32, f64)] {
+        if self.followers.is_empty() {
             return &[];
         }
-        self.of_end.get(&node).map_or(&[], Vec::as_slice)
+        self.followers.get(&node).map_or(&[], Vec::as_slice)
     }
 
-    /// The row of a node that follows sites, from the site of each node (`u32::MAX` for none); `None` if it is free, or an end is no site.
+    /// The row of a node that follows sites, from the site of each node (`u32::MAX` for none); `None` if it is free, or follows a node that is no site.
     pub fn row(&self, node: u32, node_site: &[u32]) -> Option<Vec<(u32, f64)>> {
-        let sites = self.ends(node)?.map(|n| node_site[n as usize]);
-        let all_are = sites.iter().all(|&s| s != u32::MAX);
-        all_are.then(|| sites.map(|s| (s, 0.5)).to_vec())
+        let followed = self.followed(node)?.iter();
+        let row = followed.map(|&(n, w)| (node_site[n as usize], w));
+        row.map(|(site, w)| (site != u32::MAX).then_some((site, w)))
+            .collect()
     }
 }

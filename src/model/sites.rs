@@ -26,14 +26,14 @@ impl<const D: usize> Model<D> {
         let own = (0..self.mesh.cell_count()).filter(|&c| self.node_takes(c));
         let mut volumes = fem::nodal_volumes(&self.mesh, own);
         for n in 0..volumes.len() as u32 {
-            for &tied in self.ties.followers(n) {
-                volumes[n as usize] += 0.5 * volumes[tied as usize];
+            for &(tied, weight) in self.ties.followers(n) {
+                volumes[n as usize] += weight * volumes[tied as usize];
             }
         }
         let mut node_site = vec![NONE; self.mesh.nodes.len()];
         for n in 0..self.mesh.nodes.len() {
             let constrained = interface.constrained.is_some() && points[n];
-            let tied = self.ties.ends(n as u32).is_some();
+            let tied = self.ties.followed(n as u32).is_some();
             if element[n] && !constrained && !tied {
                 node_site[n] = self.sites.len() as u32;
                 self.sites.push(Site {

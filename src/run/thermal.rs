@@ -91,8 +91,8 @@ impl<const D: usize> Thermal<D> {
         };
         let nodes = mesh.cell(c).iter();
         nodes
-            .map(|&n| match model.followed_ends(n) {
-                Some([p, q]) => (free(p) + free(q)) * 0.5,
+            .map(|&n| match model.followed_nodes(n) {
+                Some(followed) => followed.iter().map(|&(m, w)| free(m) * w).sum(),
                 None => free(n),
             })
             .collect()
@@ -288,14 +288,14 @@ fn parted<const D: usize>(here: &Rise<D>, there: &Rise<D>, xi: &Vector<D>) -> Ve
     xi * (mean + 0.5 * slope.dot(xi)) - slope * (0.5 * xi.norm_squared())
 }
 
-/// The sites whose rows are those of elements alone that take the force of each node, with the part of it: its own, or the ends of its edge where it follows them.
+/// The sites whose rows are those of elements alone that take the force of each node, with the part of it: its own, or those that it follows.
 fn takers<const D: usize>(model: &Model<D>, inner: &[bool]) -> Vec<Vec<(usize, f64)>> {
     let mut takers = vec![Vec::new(); model.mesh.nodes.len()];
     for (site, s) in model.sites.iter().enumerate().filter(|s| inner[s.0]) {
         if let SiteKind::Node(n) = s.kind {
             takers[n as usize].push((site, 1.0));
-            for &follower in model.followers_of_site(site) {
-                takers[follower as usize].push((site, 0.5));
+            for &(follower, weight) in model.followers_of_site(site) {
+                takers[follower as usize].push((site, weight));
             }
         }
     }

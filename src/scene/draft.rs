@@ -28,7 +28,7 @@ use super::validated::{Scene, Solver};
 use super::zones::Placed;
 use super::{
     adaptive_zone, agreement, coupling_selection, cracks_and_voids, elements, failure, initial,
-    lattice_regions, material_interfaces, output, solve, zones,
+    lattice_regions, material_interfaces, output, rim, solve, zones,
 };
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
@@ -56,6 +56,8 @@ pub(crate) struct Draft<'a, const D: usize> {
     /// Beginning of the names of its files.
     pub name: &'a str,
     pub fingerprint: Fingerprint,
+    /// Horizon and points, where they were chosen with another mesh.
+    pub lattice: Option<Peridynamics<D>>,
 }
 
 impl<'a, const D: usize> Draft<'a, D> {
@@ -114,6 +116,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             solver,
             name,
             fingerprint,
+            lattice: None,
         })
     }
 
@@ -122,6 +125,9 @@ impl<'a, const D: usize> Draft<'a, D> {
     /// # Errors
     /// A [`SceneError`] with place, value and remedy.
     pub fn scene(&self, placed: Option<&Placed>) -> Result<Scene<D>, SceneError> {
+        if let Some(span) = rim::wanted(self.spec).filter(|_| self.lattice.is_none()) {
+            return rim::scene(self, placed, span);
+        }
         let (mut scene, otherwise) = self.with_coupling(placed, None)?;
         if let Some(coupling) = otherwise.filter(|_| placed.is_none()) {
             // an alternative that is wrong itself is none
@@ -236,7 +242,7 @@ impl<'a, const D: usize> Draft<'a, D> {
     }
 
     /// The scene with the coupling that it names, or with another one `instead`; and the coupling to go on with if that one turns out not to hold.
-    fn with_coupling(
+    pub(super) fn with_coupling(
         &self,
         placed: Option<&Placed>,
         instead: Option<&CouplingSpec>,
@@ -253,7 +259,10 @@ impl<'a, const D: usize> Draft<'a, D> {
         self.refuse_missing_peridynamics(&selected)?;
         let mut zones = zones::zones(spec, &selected, mesh, placed)?;
         let peridynamics = (spec.peridynamics.as_ref())
-            .map(|p| peridynamics::peridynamics(p, traits.lattice, mesh, &zones))
+            .map(|p| match &self.lattice {
+                Some(chosen) => Ok(chosen.clone()),
+                None => peridynamics::peridynamics(p, traits.lattice, mesh, &zones),
+            })
             .transpose()?;
         let choices: Vec<Decision> = peridynamics.iter().flat_map(lattice_choices).collect();
         let peridynamics = peridynamics

@@ -132,8 +132,8 @@ impl<const D: usize> LocalElements<D> {
             for (k, force) in force.chunks_exact_mut(D).enumerate() {
                 if let SiteKind::Node(n) = model.sites[chunk * CHUNK + k].kind {
                     let mut own: Vector<D> = self.elements.force(n);
-                    for &tied in model.ties.followers(n) {
-                        own += self.elements.force(tied) * 0.5;
+                    for &(tied, weight) in model.ties.followers(n) {
+                        own += self.elements.force(tied) * weight;
                     }
                     force.iter_mut().zip(own.iter()).for_each(|(f, x)| *f += x);
                 }

@@ -8,7 +8,7 @@ use crate::{
     tensor::Tensor,
 };
 
-/// The blocks of the tangent of some elements: nodes take forces as sites, or hand half of them to each of two (see [`crate::mesh::Tie`]), and move with the sites that they follow.
+/// The blocks of the tangent of some elements: nodes take forces as sites, or hand them to those that they follow (see [`crate::mesh::Tie`]), and move with the sites that they follow.
 #[derive(Clone, Debug)]
 pub(super) struct TangentPattern {
     /// The sites in whose rows a node's force counts.
@@ -23,8 +23,8 @@ impl TangentPattern {
         for (site, place) in model.sites.iter().enumerate() {
             if let SiteKind::Node(n) = place.kind {
                 takers[n as usize].push((site as u32, 1.0));
-                for &tied in model.ties.followers(n) {
-                    takers[tied as usize].push((site as u32, 0.5));
+                for &(tied, weight) in model.ties.followers(n) {
+                    takers[tied as usize].push((site as u32, weight));
                 }
             }
         }

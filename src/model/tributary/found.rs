@@ -1,6 +1,6 @@
 //! Volumes and moments of the parts of cells that are found for points of a lattice.
 
-use super::simplex::Simplex;
+use crate::model::simplex::Simplex;
 use crate::tensor::{Tensor, Vector};
 use rustc_hash::FxHashMap;
 

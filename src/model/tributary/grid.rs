@@ -5,7 +5,8 @@ use std::sync::OnceLock;
 use nalgebra::DMatrix;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::{found::Detail, simplex::Cells};
+use super::found::Detail;
+use crate::model::simplex::Cells;
 use crate::{
     fem::Locator,
     model::{Bins, FitDegree, Model, SiteKind, least_squares_gradient},

@@ -1,6 +1,6 @@
 //! Quadrature over the parts of cells and facets beyond a plane.
 
-use super::simplex::{Simplex, facet_simplices, simplices_of};
+use crate::model::simplex::{Simplex, facet_simplices, simplices_of};
 use crate::fem;
 use crate::mesh::Mesh;
 use crate::mesh::boundary::{BoundaryFacet, normal_area};

@@ -1,6 +1,6 @@
 //! The cells of a lattice that the edge of a region cuts, and what cells of the mesh have of them.
 
-use super::simplex::{Cells, Simplex, as_box, box_quadrature, simplices_of};
+use crate::model::simplex::{Cells, Simplex, as_box, box_quadrature, simplices_of};
 use crate::model::tributary::found::{Detail, Found, FoundCells};
 use crate::{model::Model, shape::Shape, tensor::Vector};
 

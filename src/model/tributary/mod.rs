@@ -2,7 +2,6 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `simplex.rs` | cells of the mesh diced by the cells of a lattice |
 //! | `grid.rs` | places on a lattice, expressed through sites |
 //! | `around.rs` | places beside points at centroids |
 //! | `marks.rs` | the cells of a lattice that the edge of a region cuts |
@@ -28,7 +27,6 @@ mod half_space;
 mod marks;
 mod parts;
 mod shares;
-mod simplex;
 mod volumes;
 
 pub use crate::model::tributary::found::{Detail, Moments};
@@ -36,10 +34,12 @@ pub use half_space::HalfSpace;
 pub use parts::Parts;
 pub use volumes::Tributary;
 
-use self::simplex::{Cells, as_box};
 use crate::{
     fem,
-    model::{CellRole, Interface, Model, PointSource, SiteKind},
+    model::{
+        CellRole, Interface, Model, PointSource, SiteKind,
+        simplex::{Cells, as_box},
+    },
 };
 
 impl Tributary {
@@ -222,10 +222,10 @@ impl<const D: usize> Model<D> {
         cells[own].iter().any(holds)
     }
 
-    /// Returns true if a node belongs to a cell and follows no ends of an edge.
+    /// Returns true if a node belongs to a cell and follows no others.
     pub fn is_placed(&self, node: u32) -> bool {
         let offsets = self.node_cells().0;
-        offsets[node as usize] < offsets[node as usize + 1] && self.ties.ends(node).is_none()
+        offsets[node as usize] < offsets[node as usize + 1] && self.ties.followed(node).is_none()
     }
 
     /// Returns true if all sites that are points lie in the cells that `counts` names.

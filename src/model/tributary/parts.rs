@@ -7,12 +7,14 @@ use super::{
     around::{Around, centroid_sites},
     grid::{Beyond, Follows, Grid},
     marks::Marks,
-    simplex::{Cells, Simplex, box_quadrature, facet_simplices, moments_of_cells},
 };
 use crate::{
     fem,
     mesh::boundary::{BoundaryFacet, normal_area},
-    model::{Model, PointSource, SiteKind},
+    model::{
+        Model, PointSource, SiteKind,
+        simplex::{Cells, Simplex, box_quadrature, facet_simplices, moments_of_cells},
+    },
     parallel,
     shape::Shape,
     tensor::{Tensor, Vector},

@@ -53,8 +53,8 @@ pub use motion::{
 };
 pub use named_law::Given;
 pub use region::{
-    AutoSpec, BallSpec, BodySpec, BoxSpec, CellsSpec, EdgeSpec, FollowSpec, NearSpec, SegmentSpec,
-    ShapeSpec, SkinSpec, TransitionSpec, WithoutSpec, ZonesSpec,
+    AutoSpec, BallSpec, BodySpec, BoxSpec, CellsSpec, EdgeSpec, FollowSpec, NearSpec, RimSpec,
+    SegmentSpec, ShapeSpec, SkinSpec, TransitionSpec, WithoutSpec, ZonesSpec,
 };
 pub use table::TableSpec;
 pub use user_material::{EnergiesSpec, StrainsSpec, TangentSpec, UmatSpec};

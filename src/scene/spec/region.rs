@@ -35,6 +35,10 @@ pub struct ZonesSpec {
     /// Cells of the nonlocal zone that are elements all the same, so that no bond is missing there.
     #[serde(default)]
     pub skin: Option<SkinSpec>,
+    /// Cells along which the seam runs; "mesh" if left out.
+    #[serde(default)]
+    #[schemars(with = "Option<RimSpec>")]
+    pub rim: Option<Spanned<RimSpec>>,
     /// Parts of the nonlocal zone with a horizon and a lattice of their own, by name; a layer of elements keeps them apart. Coupling `truncated` only.
     #[serde(default)]
     pub bodies: BTreeMap<Text, BodySpec>,
@@ -88,6 +92,16 @@ pub struct BodySpec {
 pub enum SkinSpec {
     /// One cell thick on the boundary of the mesh; meant for the coupling `truncated`.
     FreeSurfaces,
+}
+
+/// Cells along which the seam runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RimSpec {
+    /// Those of the mesh.
+    Mesh,
+    /// A layer of elements on the lattice of the points, tied to the mesh around it; the zone consists of cells of the lattice, whatever the mesh is. Coupling `truncated` only.
+    Own,
 }
 
 /// A region of space or a named set of cells.

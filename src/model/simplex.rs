@@ -10,7 +10,7 @@ use crate::{
 ///
 /// Shapes: `corners` beyond `count`, its dimension plus one, have no meaning.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Simplex<const D: usize> {
+pub(in crate::model) struct Simplex<const D: usize> {
     pub corners: [Vector<D>; 4],
     pub count: usize,
 }
@@ -23,7 +23,7 @@ const GAUSS: [(f64, f64); 3] = [
 ];
 
 impl<const D: usize> Simplex<D> {
-    fn of(corners: &[Vector<D>]) -> Self {
+    pub fn of(corners: &[Vector<D>]) -> Self {
         Self {
             corners: std::array::from_fn(|i| corners[i.min(corners.len() - 1)]),
             count: corners.len(),
@@ -74,6 +74,45 @@ impl<const D: usize> Simplex<D> {
         }
     }
 
+    /// Its section by the plane `x[axis] = at`, of one dimension less: one simplex, or two where the plane parts its corners two and two.
+    pub fn section(&self, axis: usize, at: f64) -> Vec<Self> {
+        let height = |i: usize| self.corners[i][axis] - at;
+        let (below, above): (Vec<usize>, Vec<usize>) =
+            (0..self.count).partition(|&i| height(i) < 0.0);
+        let between = |p: usize, q: usize| {
+            let t = height(p) / (height(p) - height(q));
+            let mut x = self.corners[p] + (self.corners[q] - self.corners[p]) * t;
+            x[axis] = at;
+            x
+        };
+        let all: Vec<Vector<D>> = (below.iter())
+            .flat_map(|&p| above.iter().map(move |&q| between(p, q)))
+            .collect();
+        match (all.len(), self.count) {
+            (0, _) => Vec::new(),
+            // two edges from each of two corners: neighbours share a corner
+            (4, 4) => vec![
+                Self::of(&[all[0], all[1], all[2]]),
+                Self::of(&[all[1], all[2], all[3]]),
+            ],
+            _ => vec![Self::of(&all)],
+        }
+    }
+
+    /// The same with one coordinate of all corners.
+    pub fn moved_to(&self, axis: usize, at: f64) -> Self {
+        let mut moved = *self;
+        moved.corners.iter_mut().for_each(|x| x[axis] = at);
+        moved
+    }
+
+    /// The same with all corners drawn to a place, by a part of the way.
+    pub fn drawn_to(&self, place: &Vector<D>, part: f64) -> Self {
+        let mut moved = *self;
+        moved.corners.iter_mut().for_each(|x| *x += (place - *x) * part);
+        moved
+    }
+
     /// Its two halves, cut at the middle of the longest edge.
     pub fn halves(&self) -> [Self; 2] {
         let pairs = (0..self.count).flat_map(|i| (0..i).map(move |j| (i, j)));
@@ -117,7 +156,7 @@ fn cross<const D: usize>(a: &Vector<D>, b: &Vector<D>) -> Vector<D> {
 
 /// The cells of a lattice, by planes half a spacing off its points.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Cells<const D: usize> {
+pub(in crate::model) struct Cells<const D: usize> {
     pub origin: Vector<D>,
     pub spacing: f64,
 }
@@ -186,7 +225,7 @@ impl<const D: usize> Cells<D> {
 
 /// The corners of a cell of a mesh as simplices: a quadrilateral as two triangles, a hexahedron with plane faces as six tetrahedra around its diagonal. Any other solid is divided from its centre, a bent face from
 /// its own: the volume of a trilinear hexahedron is that of these 24 tetrahedra [Grandy 1997, UCRL-ID-128886], and neighbours divide their face alike.
-pub(super) fn simplices_of<const D: usize>(mesh: &Mesh<D>, c: usize) -> Vec<Simplex<D>> {
+pub(in crate::model) fn simplices_of<const D: usize>(mesh: &Mesh<D>, c: usize) -> Vec<Simplex<D>> {
     let x: Vec<Vector<D>> = mesh
         .corners(c)
         .iter()
@@ -252,7 +291,7 @@ fn has_plane_faces<const D: usize>(shape: CellShape, x: &[Vector<D>]) -> bool {
 }
 
 /// A facet as simplices.
-pub(super) fn facet_simplices<const D: usize>(mesh: &Mesh<D>, facet: &[u32]) -> Vec<Simplex<D>> {
+pub(in crate::model) fn facet_simplices<const D: usize>(mesh: &Mesh<D>, facet: &[u32]) -> Vec<Simplex<D>> {
     let facet = facet_corners::<D>(facet).iter();
     let x: Vec<Vector<D>> = facet.map(|&n| mesh.nodes[n as usize]).collect();
     match x.len() {
@@ -266,7 +305,7 @@ pub(super) fn facet_simplices<const D: usize>(mesh: &Mesh<D>, facet: &[u32]) -> 
 }
 
 /// The corners of a cell that is a box along the axes, if it is one.
-pub(super) fn as_box<const D: usize>(mesh: &Mesh<D>, c: usize) -> Option<(Vector<D>, Vector<D>)> {
+pub(in crate::model) fn as_box<const D: usize>(mesh: &Mesh<D>, c: usize) -> Option<(Vector<D>, Vector<D>)> {
     let nodes = mesh.corners(c);
     let (low, high) = mesh.bounds_of(nodes);
     let at_corner = |x: &Vector<D>| (0..D).all(|i| x[i] == low[i] || x[i] == high[i]);
@@ -275,7 +314,7 @@ pub(super) fn as_box<const D: usize>(mesh: &Mesh<D>, c: usize) -> Option<(Vector
 }
 
 /// Visits the two Gauss points along each axis of a box, with their weights: exact to degree 3 in each coordinate.
-pub(super) fn box_quadrature<const D: usize>(
+pub(in crate::model) fn box_quadrature<const D: usize>(
     low: &Vector<D>,
     high: &Vector<D>,
     mut visit: impl FnMut(Vector<D>, f64),
@@ -292,7 +331,7 @@ pub(super) fn box_quadrature<const D: usize>(
 }
 
 /// Volume and first moment of the cells of a mesh, by their own quadrature.
-pub(super) fn moments_of_cells<const D: usize>(
+pub(in crate::model) fn moments_of_cells<const D: usize>(
     mesh: &Mesh<D>,
     cells: impl Iterator<Item = usize>,
     about: &Vector<D>,

@@ -1,0 +1,100 @@
+//! Cells of which only a part belongs to the body, and nodes that follow others: a mesh into which a patch of other cells is embedded.
+//!
+//! A cut cell keeps its nodes and shape functions. Its integrals are those over the part that is left, by a rule of its own, so that stiffness, masses and loads
+//! are exact for the part.
+
+use std::collections::BTreeMap;
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::tensor::Vector;
+
+/// A quadrature rule of a cut cell: reference coordinates and weights.
+pub type CutRule = Vec<([f64; 3], f64)>;
+
+/// The rules of a cell of which only a part belongs to the body.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CutCell {
+    /// The part of its volume that belongs to the body.
+    pub fraction: f64,
+    /// Integrates a stiffness.
+    pub stiffness: CutRule,
+    /// Integrates polynomials of degree two: masses and body forces.
+    pub mass: CutRule,
+}
+
+/// Changes that an embedded patch makes to a mesh; empty in a mesh without one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Embedded<const D: usize> {
+    /// Cells of which only a part belongs to the body.
+    pub cut: FxHashMap<u32, CutCell>,
+    /// Nodes that follow others, with weights that add up to one and are exact for affine fields. The others follow none.
+    pub followers: BTreeMap<u32, Vec<(u32, f64)>>,
+    /// Facets of one cell only that are no surface of the body, by their sorted corners.
+    pub(super) inner: FxHashSet<[u32; 4]>,
+    /// The place of the patch.
+    pub covered: Covered<D>,
+}
+
+/// A union of cells of a grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Covered<const D: usize> {
+    /// Lower corner of the cell of index zero.
+    pub corner: Vector<D>,
+    /// Edge of the cells.
+    pub edge: f64,
+    /// Its cells.
+    pub cells: FxHashSet<[i32; D]>,
+}
+
+impl<const D: usize> Default for Embedded<D> {
+    fn default() -> Self {
+        Self {
+            cut: FxHashMap::default(),
+            followers: BTreeMap::new(),
+            inner: FxHashSet::default(),
+            covered: Covered {
+                corner: Vector::zeros(),
+                edge: 1.0,
+                cells: FxHashSet::default(),
+            },
+        }
+    }
+}
+
+impl<const D: usize> Covered<D> {
+    /// Distance from the faces, in edges, within which a position does not lie within.
+    const ON_FACE: f64 = 1e-7;
+
+    /// Returns true if a position lies within, and not on a face.
+    pub fn holds(&self, x: &Vector<D>) -> bool {
+        let at = (x - self.corner) / self.edge;
+        (0..1usize << D).all(|bits| {
+            self.cells.contains(&std::array::from_fn(|i| {
+                let sign = if bits >> i & 1 == 1 { 1.0 } else { -1.0 };
+                (at[i] + sign * Self::ON_FACE).floor() as i32
+            }))
+        })
+    }
+}
+
+impl<const D: usize> Embedded<D> {
+    /// Returns true if a position lies in the part of a cell that a patch took.
+    pub fn is_taken(&self, c: usize, x: &Vector<D>) -> bool {
+        self.cut_cell(c).is_some() && self.covered.holds(x)
+    }
+
+    /// The rules of a cell, where only a part of it belongs to the body.
+    #[inline]
+    pub fn cut_cell(&self, c: usize) -> Option<&CutCell> {
+        match self.cut.is_empty() {
+            true => None,
+            false => self.cut.get(&(c as u32)),
+        }
+    }
+
+    /// Takes a facet, by its corners, out of the surface of the body.
+    pub fn hide(&mut self, corners: &[u32]) {
+        self.inner.insert(super::boundary::key(corners.iter().copied()));
+    }
+}

@@ -1,0 +1,300 @@
+//! Lattice cells of a patch: the zone, the rim around it, and the faces of the rim.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::PatchError;
+use crate::{
+    mesh::Mesh,
+    model::simplex::{Cells, simplices_of},
+    parallel,
+    tensor::Vector,
+};
+
+/// Part of a cell's volume below which it is none, and above which less one it is whole.
+const PART: f64 = 1e-9;
+
+/// A cell of the lattice.
+pub(super) type Index<const D: usize> = [i32; D];
+
+/// Cells of a patch.
+pub(super) struct PatchCells<const D: usize> {
+    pub cells: Cells<D>,
+    /// Cells that hold points.
+    pub zone: BTreeSet<Index<D>>,
+    /// Cells of zone and rim.
+    pub all: BTreeSet<Index<D>>,
+    /// The cells of the mesh that have a part in each cell of the lattice in and around the patch, with its volume.
+    pub held: BTreeMap<Index<D>, Vec<(u32, f64)>>,
+}
+
+/// A face of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Face<const D: usize> {
+    pub cell: Index<D>,
+    pub axis: usize,
+    pub is_upper: bool,
+}
+
+impl<const D: usize> Face<D> {
+    /// The cell on the other side.
+    pub fn neighbour(&self) -> Index<D> {
+        let mut other = self.cell;
+        other[self.axis] += if self.is_upper { 1 } else { -1 };
+        other
+    }
+
+    /// Its nodes, the first axis within the face the fastest; node `i` is the lower corner of cell `i`.
+    pub fn nodes(&self) -> Vec<Index<D>> {
+        let within: Vec<usize> = (0..D).filter(|&k| k != self.axis).collect();
+        let mut corner = self.cell;
+        corner[self.axis] += i32::from(self.is_upper);
+        (0..1usize << within.len())
+            .map(|bits| {
+                let mut node = corner;
+                for (k, &axis) in within.iter().enumerate() {
+                    node[axis] += (bits >> k & 1) as i32;
+                }
+                node
+            })
+            .collect()
+    }
+}
+
+impl<const D: usize> PatchCells<D> {
+    /// The cells whose centre is wanted, and the rim around them.
+    pub fn new(
+        mesh: &Mesh<D>,
+        cells: Cells<D>,
+        is_wanted: &(dyn Fn(&Vector<D>) -> bool + Sync),
+    ) -> Result<Self, PatchError> {
+        let (low, high) = mesh.bounds();
+        let (from, to) = cells.range(&low, &high);
+        let wanted: BTreeSet<Index<D>> = parallel::map(
+            (to[0] - from[0] + 1).max(0) as usize,
+            1,
+            |k| -> Vec<Index<D>> {
+                let (mut low, mut high) = (from, to);
+                low[0] += k as i32;
+                high[0] = low[0];
+                block(low, high)
+                    .filter(|index| is_wanted(&cells.centre(index)))
+                    .collect()
+            },
+        )
+        .into_iter()
+        .flatten()
+        .collect();
+        let empty = PatchError::Empty {
+            edge: cells.spacing,
+        };
+        let Some((from, to)) = extent(&wanted) else {
+            return Err(empty);
+        };
+        let held = held(mesh, &cells, from.map(|i| i - 3), to.map(|i| i + 3));
+        let mut patch = Self {
+            cells,
+            zone: BTreeSet::new(),
+            all: BTreeSet::new(),
+            held,
+        };
+        patch.zone = (wanted.into_iter())
+            .filter(|index| patch.part(index) > 1.0 - PART)
+            .collect();
+        if patch.zone.is_empty() {
+            return Err(empty);
+        }
+        for index in patch.zone.clone() {
+            for other in around(&index) {
+                patch.add(other)?;
+            }
+        }
+        while let Some(missing) = patch.missing() {
+            for index in missing {
+                patch.add(index)?;
+            }
+        }
+        Ok(patch)
+    }
+
+    /// Refuses a patch whose cells hold several materials.
+    pub fn check_materials(&self, material: &dyn Fn(u32) -> u16) -> Result<(), PatchError> {
+        let mut first = None;
+        for index in &self.all {
+            for &(c, _) in &self.held[index] {
+                if *first.get_or_insert_with(|| material(c)) != material(c) {
+                    return Err(PatchError::Materials {
+                        position: self.cells.centre(index).iter().copied().collect(),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Part of a cell that lies in the body.
+    fn part(&self, index: &Index<D>) -> f64 {
+        let volume: f64 = (self.held.get(index)).map_or(0.0, |own| own.iter().map(|p| p.1).sum());
+        volume / self.cells.spacing.powi(D as i32)
+    }
+
+    /// Returns true if anything of the body lies in a cell.
+    fn is_material(&self, index: &Index<D>) -> bool {
+        self.part(index) > PART
+    }
+
+    /// Takes a cell into the patch, if it lies in the body.
+    fn add(&mut self, index: Index<D>) -> Result<(), PatchError> {
+        let part = self.part(&index);
+        if part <= PART {
+            return Ok(());
+        }
+        if part <= 1.0 - PART {
+            return Err(PatchError::Surface {
+                position: self.cells.centre(&index).iter().copied().collect(),
+                percent: 100.0 * part,
+            });
+        }
+        self.all.insert(index);
+        Ok(())
+    }
+
+    /// The faces between the patch and the body beyond it.
+    pub fn faces(&self) -> Vec<Face<D>> {
+        let mut faces = Vec::new();
+        for &cell in &self.all {
+            for axis in 0..D {
+                for is_upper in [false, true] {
+                    let face = Face {
+                        cell,
+                        axis,
+                        is_upper,
+                    };
+                    let other = face.neighbour();
+                    if !self.all.contains(&other) && self.is_material(&other) {
+                        faces.push(face);
+                    }
+                }
+            }
+        }
+        faces
+    }
+
+    /// The axis of the plane part of Γ that each node of it belongs to.
+    pub fn axes(faces: &[Face<D>]) -> BTreeMap<Index<D>, usize> {
+        let mut axes = BTreeMap::new();
+        for face in faces {
+            for node in face.nodes() {
+                let own = axes.entry(node).or_insert(face.axis);
+                *own = face.axis.min(*own);
+            }
+        }
+        axes
+    }
+
+    /// Cells that the patch must have too: beside faces none of whose nodes belongs to their plane part, and where it touches itself along less than a face.
+    fn missing(&self) -> Option<BTreeSet<Index<D>>> {
+        let faces = self.faces();
+        let axes = Self::axes(&faces);
+        let mut missing = BTreeSet::new();
+        for face in &faces {
+            if face.nodes().iter().all(|node| axes[node] != face.axis) {
+                missing.insert(face.neighbour());
+            }
+        }
+        for node in axes.keys() {
+            let cells: Vec<Index<D>> = block(node.map(|i| i - 1), *node).collect();
+            let (own, others): (Vec<_>, Vec<_>) =
+                cells.into_iter().partition(|c| self.all.contains(c));
+            if !is_connected(&own) || !is_connected(&others) {
+                missing.extend(others.into_iter().filter(|c| self.is_material(c)));
+            }
+        }
+        (!missing.is_empty()).then_some(missing)
+    }
+
+    /// Position of a node of the lattice's cells.
+    pub fn node(&self, index: &Index<D>) -> Vector<D> {
+        self.cells.centre(index) - Vector::repeat(0.5 * self.cells.spacing)
+    }
+}
+
+/// Returns true if the cells around a node hang together by faces.
+fn is_connected<const D: usize>(cells: &[Index<D>]) -> bool {
+    let mut reached: Vec<Index<D>> = cells.iter().take(1).copied().collect();
+    let mut k = 0;
+    while k < reached.len() {
+        for other in cells {
+            let apart: i32 = (0..D).map(|i| (other[i] - reached[k][i]).abs()).sum();
+            if apart == 1 && !reached.contains(other) {
+                reached.push(*other);
+            }
+        }
+        k += 1;
+    }
+    reached.len() == cells.len()
+}
+
+/// The cells from one corner to another, both included.
+pub(super) fn block<const D: usize>(
+    from: Index<D>,
+    to: Index<D>,
+) -> impl Iterator<Item = Index<D>> {
+    let counts: [usize; D] = std::array::from_fn(|i| (to[i] - from[i] + 1).max(0) as usize);
+    (0..counts.iter().product::<usize>()).map(move |number| {
+        let mut rest = number;
+        std::array::from_fn(|i| {
+            let k = rest % counts[i];
+            rest /= counts[i];
+            from[i] + k as i32
+        })
+    })
+}
+
+/// A cell and its neighbours by faces, edges and corners.
+fn around<const D: usize>(index: &Index<D>) -> impl Iterator<Item = Index<D>> + use<D> {
+    block(index.map(|i| i - 1), index.map(|i| i + 1))
+}
+
+/// The corners of the box around cells.
+fn extent<const D: usize>(cells: &BTreeSet<Index<D>>) -> Option<(Index<D>, Index<D>)> {
+    let first = *cells.first()?;
+    Some(cells.iter().fold((first, first), |(low, high), index| {
+        (
+            std::array::from_fn(|i| low[i].min(index[i])),
+            std::array::from_fn(|i| high[i].max(index[i])),
+        )
+    }))
+}
+
+/// The cells of the mesh in each cell of the lattice between two corners, with the volume of the part there.
+fn held<const D: usize>(
+    mesh: &Mesh<D>,
+    cells: &Cells<D>,
+    from: Index<D>,
+    to: Index<D>,
+) -> BTreeMap<Index<D>, Vec<(u32, f64)>> {
+    let meets = |low: &Index<D>, high: &Index<D>| {
+        (0..D).all(|i| low[i] <= to[i] && high[i] >= from[i])
+    };
+    let of_cell = |c: usize| {
+        let mut parts: BTreeMap<Index<D>, f64> = BTreeMap::new();
+        let (low, high) = mesh.bounds_of(mesh.corners(c));
+        let (low, high) = cells.range(&low, &high);
+        if meets(&low, &high) {
+            for simplex in simplices_of(mesh, c) {
+                cells.dice(&simplex, &meets, &mut |index, part| {
+                    *parts.entry(index).or_insert(0.0) += part.size();
+                });
+            }
+        }
+        parts
+    };
+    let mut held: BTreeMap<Index<D>, Vec<(u32, f64)>> = BTreeMap::new();
+    let each = parallel::map(mesh.cell_count(), 64, of_cell);
+    for (c, parts) in each.into_iter().enumerate() {
+        for (index, volume) in parts {
+            held.entry(index).or_default().push((c as u32, volume));
+        }
+    }
+    held
+}

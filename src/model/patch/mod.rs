@@ -1,0 +1,193 @@
+//! A patch of lattice cells embedded in the elements of any mesh.
+//!
+//! | file | content |
+//! |---|---|
+//! | `cells.rs` | cells of the zone, the rim around them, and the faces Γ of the rim |
+//! | `cuts.rs` | elements that Γ cuts: what is left of them |
+//! | `tie.rs` | the displacement of the nodes of Γ, by a dual mortar |
+//! | `followers.rs` | nodes that no good element holds |
+//! | `composite.rs` | zone, rim and what is left of the elements as one mesh |
+//!
+//! The peridynamic zone is a union of lattice cells. Around it lies a *rim* of elements on the same lattice, so that a coupling sees a seam that follows the lattice, whatever the mesh is. The elements of the mesh end at Γ, the outer face of the rim:
+//! their integrals are over what lies outside. The rim's nodes on Γ follow the elements in the mean,
+//!
+//! ```text
+//! ∫_Γ ψ_i (u_rim − u_mesh) dA = 0
+//! ```
+//!
+//! with functions ψ that are dual to the shape functions on each plane part of Γ [Wohlmuth2000] and add up to one, so that the tie carries a constant traction and the patch test passes. Each node of Γ has a row of its own. A node where parts of Γ
+//! with different normals meet belongs to the part whose axis comes first. Nodes of the mesh with no element of which enough is left follow the nearest one that has, as in aggregated cut elements [Badia2018].
+//! All of this is the transfer T of the model, and constant.
+
+mod cells;
+mod composite;
+mod cuts;
+mod followers;
+mod tie;
+
+#[cfg(test)]
+mod tests;
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use self::{cells::PatchCells, composite::Composite, cuts::Cuts};
+use crate::{
+    mesh::{CellShape, Mesh},
+    model::simplex::{Cells, as_box},
+    tensor::Vector,
+};
+
+/// Reasons for which a patch cannot be embedded.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PatchError {
+    /// No cell of the lattice has its centre in the zone and lies within the body.
+    #[error("no cell of the lattice, of edge {edge}, lies in the zone and within the body; make the zone larger or the spacing smaller")]
+    Empty {
+        /// Edge of the cells \[m\].
+        edge: f64,
+    },
+    /// A cell of the rim lies in the body in part.
+    #[error("the surface of the body cuts the rim of the zone at {position:?}: {percent:.1} % of a lattice cell lies within; keep the zone two spacings and a cell away from the surface, or let a plane of the lattice's cells be that surface (peridynamics.points.lattice.origin)")]
+    Surface {
+        /// Middle of the cell \[m\].
+        position: Vec<f64>,
+        /// Part of its volume in the body.
+        percent: f64,
+    },
+    /// The outer face of the rim cuts a cell of a kind that it may not.
+    #[error("cell {cell}, a {shape:?}, at {position:?}, is cut by the rim of the zone; only lines, triangles, tetrahedra, and rectangles and cuboids along the axes may be")]
+    Kind {
+        /// Number of the cell.
+        cell: usize,
+        /// Its shape.
+        shape: CellShape,
+        /// Its middle \[m\].
+        position: Vec<f64>,
+    },
+    /// Cells of several materials meet in the patch.
+    #[error("the zone or its rim holds two materials at {position:?}; keep both away from the border of materials")]
+    Materials {
+        /// Middle of the cell of the lattice \[m\].
+        position: Vec<f64>,
+    },
+    /// No element near a node of the mesh is left.
+    #[error("node {node} at {position:?} keeps no element of which enough is left beside the rim of the zone; refine the mesh there, or move the zone")]
+    Alone {
+        /// Number of the node.
+        node: u32,
+        /// Its position \[m\].
+        position: Vec<f64>,
+    },
+    /// A node would have no mass.
+    #[error("the elements that are left at {position:?} beside the rim of the zone give a node the volume {volume:.3e}; move the zone, or refine the mesh there")]
+    Mass {
+        /// Position of the node \[m\].
+        position: Vec<f64>,
+        /// Its volume [m^D].
+        volume: f64,
+    },
+}
+
+/// A mesh with an embedded patch.
+#[derive(Clone, Debug)]
+pub struct Patched<const D: usize> {
+    /// Zone, rim, and what is left of the mesh.
+    pub mesh: Mesh<D>,
+    /// True for the cells of the zone.
+    pub nonlocal: Vec<bool>,
+    /// The cell of the mesh before whose material each cell has.
+    pub origin: Vec<u32>,
+    /// Facets of the surface of which the patch covers a part: their corners in the mesh before, sorted.
+    pub covered: FxHashSet<Vec<u32>>,
+    /// Cells of the rim.
+    pub rim: usize,
+}
+
+/// Lattice of a patch.
+#[derive(Clone, Copy, Debug)]
+pub struct PatchLattice<const D: usize> {
+    /// A point of the lattice \[m\].
+    pub origin: Vector<D>,
+    /// Spacing \[m\].
+    pub spacing: f64,
+    /// Spacings along the edge of a cell of zone and rim.
+    pub per_cell: u32,
+}
+
+impl<const D: usize> PatchLattice<D> {
+    /// Cells of zone and rim, of which the box around a body that begins at `low` holds whole ones from its corner on, where a plane between points lies there.
+    fn cells(&self, low: &Vector<D>) -> Cells<D> {
+        let corner = self.origin.add_scalar(-0.5 * self.spacing);
+        let edge = self.spacing * f64::from(self.per_cell);
+        let first = (low - corner).map(|x| (x / self.spacing - 1e-6).ceil() * self.spacing);
+        Cells {
+            origin: corner + first + Vector::repeat(0.5 * edge),
+            spacing: edge,
+        }
+    }
+}
+
+/// Embeds a patch in a mesh: the cells of the lattice with their centre in the zone, `is_wanted`, and a rim one cell wide.
+///
+/// Nodes that `is_held` names have a prescribed motion and follow none; `material` gives the number of a cell's material.
+///
+/// # Errors
+/// [`PatchError`], each with place and remedy.
+pub fn embed<const D: usize>(
+    mesh: &Mesh<D>,
+    lattice: PatchLattice<D>,
+    is_wanted: &(dyn Fn(&Vector<D>) -> bool + Sync),
+    is_held: &dyn Fn(u32) -> bool,
+    material: &dyn Fn(u32) -> u16,
+) -> Result<Patched<D>, PatchError> {
+    let cells = lattice.cells(&mesh.bounds().0);
+    let patch = PatchCells::new(mesh, cells, is_wanted)?;
+    patch.check_materials(material)?;
+    let cuts = Cuts::new(mesh, &patch)?;
+    let followed = followers::followers(mesh, &cuts, is_held)?;
+    let rows = tie::rows(mesh, &patch, &cuts)?;
+    let composite = Composite::new(mesh, &patch, &cuts);
+    let patched = composite.with_followers(&followed, &rows);
+    check_masses(&patched.mesh)?;
+    Ok(patched)
+}
+
+/// Weights of nodes of the mesh.
+type NodeRow = Vec<(u32, f64)>;
+
+/// Adds up the weights of each node.
+fn gathered(row: impl IntoIterator<Item = (u32, f64)>) -> NodeRow {
+    let mut sums: FxHashMap<u32, f64> = FxHashMap::default();
+    for (n, w) in row {
+        *sums.entry(n).or_insert(0.0) += w;
+    }
+    let mut row: NodeRow = sums.into_iter().filter(|e| e.1.abs() > 1e-14).collect();
+    row.sort_unstable_by_key(|e| e.0);
+    row
+}
+
+/// Refuses a mesh of which a node that follows none has no positive volume.
+fn check_masses<const D: usize>(mesh: &Mesh<D>) -> Result<(), PatchError> {
+    let mut volume = crate::fem::nodal_volumes(mesh, 0..mesh.cell_count());
+    for (&n, row) in &mesh.embedded.followers {
+        let own = std::mem::take(&mut volume[n as usize]);
+        row.iter().for_each(|&(m, w)| volume[m as usize] += w * own);
+    }
+    let follows = |n: usize| mesh.embedded.followers.contains_key(&(n as u32));
+    match (0..volume.len()).find(|&n| volume[n] <= 0.0 && !follows(n)) {
+        None => Ok(()),
+        Some(n) => Err(PatchError::Mass {
+            position: mesh.nodes[n].iter().copied().collect(),
+            volume: volume[n],
+        }),
+    }
+}
+
+/// Returns true if a cell may be cut: its shape functions are polynomials in space.
+fn may_be_cut<const D: usize>(mesh: &Mesh<D>, c: usize) -> bool {
+    match mesh.shapes[c] {
+        CellShape::Line2 | CellShape::Tri3 | CellShape::Tet4 => true,
+        CellShape::Quad4 | CellShape::Hex8 => as_box(mesh, c).is_some(),
+        _ => false,
+    }
+}

@@ -1,0 +1,220 @@
+//! The scene with a rim of its own around the nonlocal zone: horizon and points by the mesh as it is, everything else by the mesh with the patch.
+
+use super::condition_list;
+use super::conditions::Condition;
+use super::draft::Draft;
+use super::error::{SceneError, SceneErrorKind};
+use super::initial;
+use super::region::{self, Region};
+use super::source::Span;
+use super::spec::{CouplingSpec, RimSpec, SceneSpec, TruncatedSpec};
+use super::temperature;
+use super::validated::Scene;
+use super::zones::Placed;
+use crate::fem::Locator;
+use crate::mesh::facet_corners;
+use crate::model::Zone;
+use crate::model::patch::{self, PatchError, PatchLattice, Patched};
+use crate::observe::report::number;
+use crate::observe::summary::Decision;
+use crate::scene::conditions::Support;
+use crate::scene::points::Points;
+use crate::scene::solve::Solve;
+use crate::tensor::Vector;
+
+/// Spacings along the edge of a cell of the rim in a motion: the rim then takes larger steps than the points. Where the surface of the body leaves no whole number of them, and at rest, it is one.
+const PER_CELL: u32 = 2;
+
+/// The place at which a scene asks for a rim of its own.
+pub(super) fn wanted(spec: &SceneSpec) -> Option<Span> {
+    let rim = spec.zones.rim.as_ref()?;
+    (*rim.get_ref() == RimSpec::Own).then(|| rim.span())
+}
+
+/// The scene whose seam runs along a rim of its own; `span` is where it asks for that.
+///
+/// # Errors
+/// Those of the scene, and [`PatchError`] at the place of the zone.
+pub(super) fn scene<const D: usize>(
+    draft: &Draft<'_, D>,
+    placed: Option<&Placed>,
+    span: Span,
+) -> Result<Scene<D>, SceneError> {
+    refuse_others(draft.spec, &span)?;
+    let truncated = CouplingSpec::Truncated(TruncatedSpec::default());
+    let instead = draft.spec.coupling.is_none().then_some(&truncated);
+    let (before, _) = draft.with_coupling(placed, instead)?;
+    let conflict = |what: String, help: &str| {
+        SceneError::new(SceneErrorKind::Conflict, what)
+            .label(span.clone(), "a layer of elements on the lattice")
+            .help(help.to_owned())
+    };
+    if !matches!(before.coupling, CouplingSpec::Truncated(_)) {
+        return Err(conflict(
+            "`zones.rim = \"own\"` and another coupling than `truncated` are set".to_owned(),
+            "use coupling.truncated, or rim = \"mesh\"",
+        ));
+    }
+    let lattice = before.peridynamics.as_ref().map(|p| &p.points);
+    let Some(&Points::Lattice { spacing, origin }) = lattice else {
+        return Err(conflict(
+            "`zones.rim = \"own\"` is set and the points are no lattice".to_owned(),
+            "use peridynamics.points.lattice, or rim = \"mesh\"",
+        ));
+    };
+    let (patched, per_cell) = embedded(draft, placed, &before, (spacing, origin))
+        .map_err(|error| conflict(format!("`zones.rim`: {error}"), "or use rim = \"mesh\""))?;
+    for condition in &draft.conditions {
+        if let Some(what) = conflict_with(condition, draft, &patched) {
+            return Err(conflict(
+                format!("`conditions.{}` {what}", condition.name),
+                "keep the zone, and a rim of a cell around it, away from there, or use rim = \"mesh\"",
+            ));
+        }
+    }
+    let choice = Decision {
+        choice: format!(
+            "a rim of {} elements of edge {} around the zone; {} elements of the mesh end at it",
+            patched.rim,
+            number(spacing * f64::from(per_cell)),
+            patched.mesh.embedded.cut.len()
+        ),
+        why: "the scene asks for a rim of its own".to_owned(),
+    };
+    let zone = Placed {
+        nonlocal: patched.nonlocal,
+        span: draft.spec.zones.nonlocal.as_ref().map_or(span, |zone| zone.span()),
+    };
+    let cell_material = (patched.origin.iter())
+        .map(|&c| draft.cell_material[c as usize])
+        .collect();
+    let (spec, mesh, clock) = (draft.spec, patched.mesh, draft.solve.clock());
+    let draft = Draft {
+        spec,
+        kinematics: draft.kinematics,
+        materials: draft.materials.clone(),
+        cell_material,
+        conditions: condition_list::conditions(&spec.conditions, &mesh, clock)?,
+        temperature: temperature::temperature(spec.temperature.as_ref(), &mesh, clock)?,
+        initial: initial::initial(&spec.initial, &mesh, clock)?,
+        impactors: draft.impactors.clone(),
+        solve: draft.solve.clone(),
+        solver: draft.solver,
+        name: draft.name,
+        fingerprint: draft.fingerprint.clone(),
+        lattice: before.peridynamics,
+        mesh,
+    };
+    let (mut scene, _) = draft.with_coupling(Some(&zone), instead)?;
+    scene.choices.push(choice);
+    Ok(scene)
+}
+
+/// Refuses what a zone with a rim of its own does not have.
+fn refuse_others(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
+    let zones = &spec.zones;
+    let others = [
+        ("zones.transition", zones.transition.is_some()),
+        ("zones.follow", zones.follow.is_some()),
+        ("zones.skin", zones.skin.is_some()),
+        ("zones.bodies", !zones.bodies.is_empty()),
+    ];
+    match others.iter().find(|other| other.1) {
+        None => Ok(()),
+        Some((key, _)) => Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!("`zones.rim = \"own\"` and `{key}` are set"),
+        )
+        .label(span.clone(), "a layer of elements on the lattice")
+        .help(format!("leave out {key}, or use rim = \"mesh\""))),
+    }
+}
+
+/// The mesh with the patch, and how many spacings its cells have along their edges.
+fn embedded<const D: usize>(
+    draft: &Draft<'_, D>,
+    placed: Option<&Placed>,
+    before: &Scene<D>,
+    (spacing, origin): (f64, Vector<D>),
+) -> Result<(Patched<D>, u32), PatchError> {
+    let mesh = &draft.mesh;
+    let typed = (draft.spec.zones.nonlocal.as_ref()).filter(|_| placed.is_none());
+    let drawn = typed.and_then(|zone| region::region("zones.nonlocal", zone.get_ref(), mesh).ok());
+    let locator = Locator::new(mesh, 0..mesh.cell_count());
+    let is_wanted = |x: &Vector<D>| match drawn.as_ref().and_then(|zone| zone.distance(x)) {
+        Some(distance) => distance <= 0.0,
+        // a set, or a zone that was placed, has cells
+        None => (locator.locate(mesh, x, 1e-9))
+            .is_some_and(|found| before.zones[found.cell] == Zone::Nonlocal),
+    };
+    let mut held = vec![false; mesh.nodes.len()];
+    for support in draft.conditions.iter().filter_map(Condition::support) {
+        match support {
+            Support::Set { nodes, .. } => nodes.iter().for_each(|&n| held[n as usize] = true),
+            Support::Inside(region) => {
+                let inside = region.select_nodes(mesh);
+                held.iter_mut().zip(inside).for_each(|(held, is)| *held |= is);
+            }
+        }
+    }
+    let embed = |per_cell: u32| {
+        let lattice = PatchLattice {
+            origin,
+            spacing,
+            per_cell,
+        };
+        patch::embed(
+            mesh,
+            lattice,
+            &is_wanted,
+            &|n| held[n as usize],
+            &|c| draft.cell_material[c as usize],
+        )
+        .map(|patched| (patched, per_cell))
+    };
+    match draft.solve {
+        Solve::Explicit(_) => match embed(PER_CELL) {
+            Err(PatchError::Surface { .. } | PatchError::Empty { .. }) => embed(1),
+            found => found,
+        },
+        Solve::Static | Solve::QuasiStatic(_) => embed(1),
+    }
+}
+
+/// What a condition does that a patch does not bear, if it does.
+fn conflict_with<const D: usize>(
+    condition: &Condition<D>,
+    draft: &Draft<'_, D>,
+    patched: &Patched<D>,
+) -> Option<String> {
+    let facets = condition.load().map(|load| load.on.facets());
+    let facets = facets.or_else(|| condition.term().map(|term| term.facets()));
+    let of_support = condition.support().map(|support| match support {
+        Support::Set { facets, .. } => facets.iter().map(Vec::as_slice).collect(),
+        Support::Inside(_) => Vec::new(),
+    });
+    let is_covered = |facet: &&[u32]| {
+        let mut corners = facet_corners::<D>(facet).to_vec();
+        corners.sort_unstable();
+        patched.covered.contains(&corners)
+    };
+    let all = facets.or(of_support).unwrap_or_default();
+    if let Some(facet) = all.iter().find(|facet| is_covered(facet)) {
+        let x = draft.mesh.bounds_of(facet).0;
+        return Some(format!(
+            "acts on a facet at {:?}, of which the zone or its rim covers a part",
+            x.as_slice()
+        ));
+    }
+    let region: &Region<D> = match condition.support() {
+        Some(Support::Inside(region)) => region,
+        _ => return None,
+    };
+    let mesh = &patched.mesh;
+    let inside = region.select_nodes(mesh);
+    let node = (mesh.embedded.followers.keys()).find(|&&n| inside[n as usize])?;
+    Some(format!(
+        "holds the node of the rim at {:?}, which follows the mesh",
+        mesh.nodes[*node as usize].as_slice()
+    ))
+}
