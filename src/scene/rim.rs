@@ -7,13 +7,15 @@ use super::error::{SceneError, SceneErrorKind};
 use super::initial;
 use super::region::{self, Region};
 use super::source::Span;
-use super::spec::{CouplingSpec, RimSpec, SceneSpec, TruncatedSpec};
+use super::spec::{
+    CouplingSpec, LatticeStart, RimSpec, SceneSpec, TransitionSpec, TruncatedSpec,
+};
 use super::temperature;
 use super::validated::Scene;
 use super::zones::Placed;
 use crate::fem::Locator;
 use crate::mesh::facet_corners;
-use crate::model::Zone;
+use crate::model::{Reach, Zone};
 use crate::model::patch::{self, PatchError, PatchLattice, Patched};
 use crate::observe::report::number;
 use crate::observe::summary::Decision;
@@ -49,12 +51,6 @@ pub(super) fn scene<const D: usize>(
             .label(span.clone(), "a layer of elements on the lattice")
             .help(help.to_owned())
     };
-    if !matches!(before.coupling, CouplingSpec::Truncated(_)) {
-        return Err(conflict(
-            "`zones.rim = \"own\"` and another coupling than `truncated` are set".to_owned(),
-            "use coupling.truncated, or rim = \"mesh\"",
-        ));
-    }
     let lattice = before.peridynamics.as_ref().map(|p| &p.points);
     let Some(&Points::Lattice { spacing, origin }) = lattice else {
         return Err(conflict(
@@ -62,7 +58,17 @@ pub(super) fn scene<const D: usize>(
             "use peridynamics.points.lattice, or rim = \"mesh\"",
         ));
     };
-    let (patched, per_cell) = embedded(draft, placed, &before, (spacing, origin))
+    let corner = match before.coupling.traits().lattice {
+        LatticeStart::OnCorner => origin,
+        LatticeStart::Halfway => origin.add_scalar(-0.5 * spacing),
+    };
+    let lattice = PatchLattice {
+        corner,
+        spacing,
+        per_cell: 1,
+        reach: reach(draft.spec, &before).map_err(|what| conflict(what, "or use rim = \"mesh\""))?,
+    };
+    let (patched, per_cell) = embedded(draft, placed, &before, lattice)
         .map_err(|error| conflict(format!("`zones.rim`: {error}"), "or use rim = \"mesh\""))?;
     for condition in &draft.conditions {
         if let Some(what) = conflict_with(condition, draft, &patched) {
@@ -114,7 +120,6 @@ pub(super) fn scene<const D: usize>(
 fn refuse_others(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
     let zones = &spec.zones;
     let others = [
-        ("zones.transition", zones.transition.is_some()),
         ("zones.follow", zones.follow.is_some()),
         ("zones.skin", zones.skin.is_some()),
         ("zones.bodies", !zones.bodies.is_empty()),
@@ -130,12 +135,42 @@ fn refuse_others(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
     }
 }
 
+/// Distance from the zone up to which a coupling needs the lattice, beside one cell: nothing where bonds end on faces; else the width of the transition zone and as far as families reach.
+fn reach<const D: usize>(spec: &SceneSpec, before: &Scene<D>) -> Result<f64, String> {
+    let law = before.point_law.linearised();
+    let coupling = before.coupling.build(law);
+    if !coupling.interface().overlap {
+        return Ok(0.0);
+    }
+    let width = match spec.zones.transition.as_ref().map(|t| t.get_ref()) {
+        None => 0.0,
+        Some(TransitionSpec::Around(width)) => width.value,
+        Some(_) => {
+            return Err(
+                "`zones.rim = \"own\"` needs `zones.transition.around`, a width: the rim reaches as far"
+                    .to_owned(),
+            );
+        }
+    };
+    let horizon = before.peridynamics.as_ref().map(|p| &p.horizon);
+    let horizon = horizon.and_then(|horizon| horizon.as_constant());
+    let families = match (&before.coupling, coupling.reach(law)) {
+        // its blending reaches one family past the zone
+        (CouplingSpec::Balanced(_), _) | (_, Reach::Neighbours) => 2.0,
+        (_, Reach::Own) => 1.0,
+    };
+    match horizon {
+        Some(horizon) => Ok(width + families * horizon),
+        None => Err("`zones.rim = \"own\"` needs one horizon".to_owned()),
+    }
+}
+
 /// The mesh with the patch, and how many spacings its cells have along their edges.
 fn embedded<const D: usize>(
     draft: &Draft<'_, D>,
     placed: Option<&Placed>,
     before: &Scene<D>,
-    (spacing, origin): (f64, Vector<D>),
+    lattice: PatchLattice<D>,
 ) -> Result<(Patched<D>, u32), PatchError> {
     let mesh = &draft.mesh;
     let typed = (draft.spec.zones.nonlocal.as_ref()).filter(|_| placed.is_none());
@@ -159,9 +194,8 @@ fn embedded<const D: usize>(
     }
     let embed = |per_cell: u32| {
         let lattice = PatchLattice {
-            origin,
-            spacing,
             per_cell,
+            ..lattice
         };
         patch::embed(
             mesh,

@@ -61,10 +61,11 @@ impl<const D: usize> Face<D> {
 }
 
 impl<const D: usize> PatchCells<D> {
-    /// The cells whose centre is wanted, and the rim around them.
+    /// The cells whose centre is wanted, and a rim of so many cells around them.
     pub fn new(
         mesh: &Mesh<D>,
         cells: Cells<D>,
+        width: i32,
         is_wanted: &(dyn Fn(&Vector<D>) -> bool + Sync),
     ) -> Result<Self, PatchError> {
         let (low, high) = mesh.bounds();
@@ -90,7 +91,7 @@ impl<const D: usize> PatchCells<D> {
         let Some((from, to)) = extent(&wanted) else {
             return Err(empty);
         };
-        let held = held(mesh, &cells, from.map(|i| i - 3), to.map(|i| i + 3));
+        let held = held(mesh, &cells, from.map(|i| i - width - 2), to.map(|i| i + width + 2));
         let mut patch = Self {
             cells,
             zone: BTreeSet::new(),
@@ -104,7 +105,7 @@ impl<const D: usize> PatchCells<D> {
             return Err(empty);
         }
         for index in patch.zone.clone() {
-            for other in around(&index) {
+            for other in block(index.map(|i| i - width), index.map(|i| i + width)) {
                 patch.add(other)?;
             }
         }
@@ -248,11 +249,6 @@ pub(super) fn block<const D: usize>(
             from[i] + k as i32
         })
     })
-}
-
-/// A cell and its neighbours by faces, edges and corners.
-fn around<const D: usize>(index: &Index<D>) -> impl Iterator<Item = Index<D>> + use<D> {
-    block(index.map(|i| i - 1), index.map(|i| i + 1))
 }
 
 /// The corners of the box around cells.

@@ -106,18 +106,20 @@ pub struct Patched<const D: usize> {
 /// Lattice of a patch.
 #[derive(Clone, Copy, Debug)]
 pub struct PatchLattice<const D: usize> {
-    /// A point of the lattice \[m\].
-    pub origin: Vector<D>,
+    /// A place where planes between its cells meet \[m\].
+    pub corner: Vector<D>,
     /// Spacing \[m\].
     pub spacing: f64,
     /// Spacings along the edge of a cell of zone and rim.
     pub per_cell: u32,
+    /// Distance from the zone up to which the rim reaches, beside one cell \[m\].
+    pub reach: f64,
 }
 
 impl<const D: usize> PatchLattice<D> {
     /// Cells of zone and rim, of which the box around a body that begins at `low` holds whole ones from its corner on, where a plane between points lies there.
     fn cells(&self, low: &Vector<D>) -> Cells<D> {
-        let corner = self.origin.add_scalar(-0.5 * self.spacing);
+        let corner = self.corner;
         let edge = self.spacing * f64::from(self.per_cell);
         let first = (low - corner).map(|x| (x / self.spacing - 1e-6).ceil() * self.spacing);
         Cells {
@@ -127,7 +129,7 @@ impl<const D: usize> PatchLattice<D> {
     }
 }
 
-/// Embeds a patch in a mesh: the cells of the lattice with their centre in the zone, `is_wanted`, and a rim one cell wide.
+/// Embeds a patch in a mesh: the cells of the lattice with their centre in the zone, `is_wanted`, and a rim around them.
 ///
 /// Nodes that `is_held` names have a prescribed motion and follow none; `material` gives the number of a cell's material.
 ///
@@ -141,7 +143,8 @@ pub fn embed<const D: usize>(
     material: &dyn Fn(u32) -> u16,
 ) -> Result<Patched<D>, PatchError> {
     let cells = lattice.cells(&mesh.bounds().0);
-    let patch = PatchCells::new(mesh, cells, is_wanted)?;
+    let width = 1 + (lattice.reach / cells.spacing - 1e-6).ceil() as i32;
+    let patch = PatchCells::new(mesh, cells, width, is_wanted)?;
     patch.check_materials(material)?;
     let cuts = Cuts::new(mesh, &patch)?;
     let followed = followers::followers(mesh, &cuts, is_held)?;
