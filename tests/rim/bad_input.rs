@@ -1,0 +1,126 @@
+//! What a zone with a rim of its own does not have is refused by name.
+
+use bondline::mesh::MeshParts;
+use bondline::{Condition, Material, Region, SceneBuilder, Silent};
+
+use super::meshes::{Body, Random};
+use super::scene;
+
+const BODY: Body<2> = Body {
+    size: [20.0, 20.0],
+    edge: 2.5,
+    seed: 900,
+};
+
+fn plate() -> SceneBuilder {
+    scene(&BODY, &mut Random::new(BODY.seed))
+        .nonlocal(Region::cuboid([7.0, 7.0], [13.0, 13.0]))
+        .material("plate", Material::bond_based(1.0))
+        .horizon(2.0)
+        .coupling("truncated")
+        .condition("left", Condition::displacement("left").x(0.0))
+        .condition("bottom", Condition::displacement("bottom").y(0.0))
+        .condition("right", Condition::traction("right").x(0.01))
+}
+
+/// Refused by the scene or its run, with each of `phrases` in the message.
+fn refused(scene: &SceneBuilder, phrases: &[&str]) {
+    let error = match scene.solve(&Silent) {
+        Err(error) => error.to_string(),
+        Ok(_) => panic!("it ran, in spite of {phrases:?}"),
+    };
+    println!("{error}");
+    let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
+    for phrase in phrases {
+        assert!(error.contains(phrase), "{phrase} is not in {error}");
+    }
+}
+
+#[test]
+fn the_plate_itself_runs() {
+    plate().solve(&Silent).unwrap();
+}
+
+#[test]
+fn a_surface_that_cuts_the_rim() {
+    let at_surface = Region::cuboid([12.0, 7.0], [20.0, 13.0]);
+    refused(
+        &plate().nonlocal(at_surface),
+        &["zones.rim", "the surface of the body cuts the rim"],
+    );
+}
+
+#[test]
+fn keys_that_do_not_go_together() {
+    let rim = "`zones.rim = \"own\"`";
+    refused(
+        &plate().set("zones.skin", "free-surfaces"),
+        &[rim, "`zones.skin`"],
+    );
+    refused(
+        &plate()
+            .set("peridynamics.points", "cells")
+            .horizon(8.0)
+            .coupling("splice"),
+        &[rim, "points", "no lattice"],
+    );
+    refused(
+        &plate()
+            .set("peridynamics.horizon", "2 + 0.01 * x")
+            .coupling("splice"),
+        &[rim, "one horizon"],
+    );
+}
+
+#[test]
+fn a_zone_without_cells() {
+    refused(
+        &plate().nonlocal(Region::cuboid([9.9, 9.9], [10.1, 10.1])),
+        &["zones.nonlocal"],
+    );
+    refused(
+        &plate().nonlocal(Region::cuboid([30.0, 30.0], [36.0, 36.0])),
+        &["zones.nonlocal"],
+    );
+}
+
+#[test]
+fn loads_and_supports_on_what_the_patch_covers() {
+    // planes between cells of the lattice coincide with the right side
+    let scene = plate()
+        .nonlocal(Region::cuboid([12.0, 7.0], [20.0, 13.0]))
+        .set("peridynamics.points.lattice.origin", [0.5, 0.5]);
+    refused(&scene, &["`conditions.right`", "covers a part"]);
+    let scene = scene.condition("right", Condition::displacement("right").x(0.01));
+    refused(&scene, &["`conditions.right`", "covers a part"]);
+    let scene = scene.condition("right", Condition::traction("top").y(0.01));
+    scene.solve(&Silent).unwrap();
+}
+
+#[test]
+fn two_materials_in_the_patch() {
+    let half = Region::cuboid([0.0, 0.0], [10.0, 20.0]);
+    let scene = plate().material("left", Material::bond_based(2.0).cells(half));
+    refused(&scene, &["two materials"]);
+}
+
+#[test]
+fn cells_that_may_not_be_cut() {
+    let body = Body::<2> { edge: 5.0, ..BODY };
+    // quadrilaterals of the jittered nodes have no constant Jacobian
+    let triangles = body.mesh();
+    let (n, at) = (4, |i: usize, j: usize| (j * 5 + i) as u64);
+    let boxes = (0..n * n).map(|k| (k % n, k / n));
+    let cells = boxes.flat_map(|(i, j)| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+    let mesh = MeshParts {
+        blocks: vec![
+            triangles.blocks[0].clone(),
+            (bondline::CellShape::Quad4, cells.collect()),
+        ],
+        ..triangles
+    };
+    refused(
+        &plate().mesh(mesh),
+        &["zones.rim", "is cut by the rim of the zone", "Quad4"],
+    );
+}
