@@ -127,7 +127,9 @@ pub(super) fn with_collar<const D: usize>(
     let filled = |c: usize| zones[c] == Zone::Nonlocal || zones[c] == outermost;
     let edge = Edge::of(mesh, filled);
     let is_near = |&n: &u32| edge.within(&mesh.nodes[n as usize], reach);
-    let role = |c| match filled(c) || mesh.cell(c).iter().any(is_near) {
+    // what is left of a cut cell lies beyond a rim that holds the whole collar, wherever its nodes lie
+    let is_cut = |c: usize| mesh.embedded.cut_cell(c).is_some();
+    let role = |c| match filled(c) || !is_cut(c) && mesh.cell(c).iter().any(is_near) {
         true => CellRole::Points,
         false => CellRole::Element,
     };

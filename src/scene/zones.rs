@@ -95,7 +95,9 @@ fn mark_transition<const D: usize>(
             .help("let it enclose the nonlocal zone, or keep the two apart; around = 0.1 does the former"));
         }
         let mut any = false;
-        for c in (0..count).filter(|&c| selected[c] && !inner[c]) {
+        // what is left of a cut cell lies beyond a rim that holds the whole transition zone, wherever its centroid lies
+        let is_cut = |c: usize| mesh.embedded.cut_cell(c).is_some();
+        for c in (0..count).filter(|&c| selected[c] && !inner[c] && !is_cut(c)) {
             zones[c] = Zone::Transition;
             any = true;
         }
