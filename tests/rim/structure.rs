@@ -244,3 +244,30 @@ fn a_plate_that_swings_freely_keeps_momentum_and_energy() {
         assert!(off < 1e-9, "{column}: {off:e}");
     }
 }
+
+/// The facets of the surface are those of the body: neither the faces of the rim nor what cells have lost the neighbour of.
+fn assert_surface<const D: usize>(body: &Body<D>, area: f64) {
+    let held = Condition::displacement("left").x(0.0);
+    let scene = truncated(body, Material::bond_based(1.0), Drawn::Angle).condition("held", held);
+    let mesh = scene.scene().unwrap().of_dimension::<D>().unwrap().mesh;
+    assert!(!mesh.embedded.cut.is_empty());
+    let facets = mesh.outer_facets();
+    let found: f64 = facets.iter().map(|f| mesh.facet_area(&f.nodes)).sum();
+    assert!((found / area - 1.0).abs() < 1e-13, "{found} {area}");
+}
+
+#[test]
+fn the_surface_stays_that_of_the_body() {
+    let plate = Body::<2> {
+        size: [14.0, 13.0],
+        edge: 2.5,
+        seed: 650,
+    };
+    assert_surface(&plate, 54.0);
+    let solid = Body::<3> {
+        size: [8.0; 3],
+        edge: 2.7,
+        seed: 651,
+    };
+    assert_surface(&solid, 384.0);
+}
