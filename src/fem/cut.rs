@@ -21,15 +21,11 @@ pub fn rule_of_part<const D: usize>(
     let fraction = volume / whole;
     let all: f64 = cell.stiffness.iter().map(|point| point.1).sum();
     let at = |x: Vector<D>, part: f64| -> Option<([f64; 3], f64)> {
-        Some((
-            padded(&reference_of(mesh, c, &x)?),
-            fraction * all * part,
-        ))
+        Some((padded(&reference_of(mesh, c, &x)?), fraction * all * part))
     };
-    let factor = cholesky(&second) * (D as f64).sqrt();
     let part = 0.5 / D as f64;
-    let mass: Option<CutRule> = (0..D)
-        .flat_map(|k| [1.0, -1.0].map(|sign| centroid + factor.column(k) * sign))
+    let mass: Option<CutRule> = (places_of_part(centroid, &second))
+        .into_iter()
         .map(|x| at(x, part))
         .collect();
     let mass = mass?;
@@ -42,6 +38,14 @@ pub fn rule_of_part<const D: usize>(
         stiffness,
         mass,
     })
+}
+
+/// Places whose mean is exact for polynomials of degree two over a part with this centroid \[m\] and second moment about it, over its size \[m²\].
+pub fn places_of_part<const D: usize>(centroid: Vector<D>, second: &Tensor<D>) -> Vec<Vector<D>> {
+    let factor = cholesky(second) * (D as f64).sqrt();
+    (0..D)
+        .flat_map(|k| [1.0, -1.0].map(|sign| centroid + factor.column(k) * sign))
+        .collect()
 }
 
 /// The lower factor of a positive semi-definite tensor; columns that rounding would make imaginary vanish.

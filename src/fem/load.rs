@@ -3,8 +3,8 @@
 use super::cell::{ReferenceCell, Rule, RulePoint};
 use super::element::for_each_point;
 use super::{line2, line3, quad4, quad8, tri3, tri6};
-use crate::mesh::Mesh;
 use crate::mesh::boundary::BoundaryFacet;
+use crate::mesh::{Mesh, facet_corners};
 use crate::tensor::Vector;
 
 /// A quadrature point of a facet.
@@ -24,7 +24,7 @@ pub struct FacetPoint<const D: usize> {
 
 /// Calls `visit` with each quadrature point of a facet, given by its nodes in order.
 ///
-/// Point in 1D; edge in 2D with 3 Gauss points, exact to degree 5; triangle with 6 points, exact to degree 4, and quadrilateral with 3 × 3 points in 3D. Facets of second order may be curved.
+/// Point in 1D; edge in 2D with 3 Gauss points, exact to degree 5; triangle with 6 points, exact to degree 4, and quadrilateral with 3 × 3 points in 3D. Facets of second order may be curved. Of a cut facet the points are those of the part that belongs to the surface, exact to degree 2.
 ///
 /// # Panics
 /// For a facet of another number of nodes, which no cell of [`super::CELLS`] has: a traction on it would be no force.
@@ -47,9 +47,51 @@ pub fn facet_points<const D: usize>(
     let Some((cell, rule)) = facet_rule::<D>(nodes) else {
         panic!("a facet of {nodes} nodes in {D} dimensions has no quadrature");
     };
+    let corners = facet_corners::<D>(facet);
+    if let Some(rule) = mesh.embedded.cut_facet(corners) {
+        // a simplex, or a rectangle along the axes: the local coordinates are affine
+        for (x, weight) in rule {
+            let xi = affine_coordinates(mesh, cell, corners, x);
+            let point = facet_point(mesh, facet, cell, &(xi, 0.0));
+            visit(&FacetPoint {
+                weight: *weight,
+                ..point
+            });
+        }
+        return;
+    }
     for point in rule {
         visit(&facet_point(mesh, facet, cell, point));
     }
+}
+
+/// Local coordinates of a place on a facet whose map is affine.
+fn affine_coordinates<const D: usize>(
+    mesh: &Mesh<D>,
+    cell: &ReferenceCell,
+    corners: &[u32],
+    x: &Vector<D>,
+) -> [f64; 3] {
+    let place = |a: usize| mesh.nodes[corners[a] as usize];
+    let last = corners.len() - 1;
+    // the corners that the first has an edge to
+    let ends: &[usize] = if last == 1 { &[1] } else { &[1, last] };
+    let mut xi = cell.corners[0];
+    let rest = x - place(0);
+    for &end in ends {
+        // edges of rectangles are normal to one another, those of triangles are made so
+        let along = place(end) - place(0);
+        let others = ends.iter().filter(|&&other| other != end);
+        let normal = others.fold(along, |normal, &other| {
+            let other = place(other) - place(0);
+            normal - other * (normal.dot(&other) / other.norm_squared())
+        });
+        let t = rest.dot(&normal) / along.dot(&normal);
+        for (k, xi) in xi.iter_mut().enumerate() {
+            *xi += t * (cell.corners[end][k] - cell.corners[0][k]);
+        }
+    }
+    xi
 }
 
 /// The cell and the rule of an edge or a face by its number of nodes.

@@ -78,7 +78,7 @@ mod second_order_tests;
 pub use body::{FemError, check};
 pub use cell::{MAX_NODES, PerNode, ReferenceCell, Rule, RulePoint};
 pub use crack_band::{CellBandError, banded_law, crack_band};
-pub use cut::rule_of_part;
+pub use cut::{places_of_part, rule_of_part};
 pub use element::{
     QuadraturePoint, cell_volume, displacement_gradient, displacement_gradient_at,
     displacement_gradient_at_centre, for_each_point, quadrature, quadrature_of, row_at,

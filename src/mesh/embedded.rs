@@ -32,6 +32,8 @@ pub struct Embedded<const D: usize> {
     pub followers: BTreeMap<u32, Vec<(u32, f64)>>,
     /// Facets of one cell only that are no surface of the body, by their sorted corners.
     pub(super) inner: FxHashSet<[u32; 4]>,
+    /// Facets of which only a part belongs to the surface, by their sorted corners, with a rule for the part.
+    pub(super) cut_facets: FxHashMap<[u32; 4], Vec<(Vector<D>, f64)>>,
     /// The place of the patch.
     pub covered: Covered<D>,
 }
@@ -53,6 +55,7 @@ impl<const D: usize> Default for Embedded<D> {
             cut: FxHashMap::default(),
             followers: BTreeMap::new(),
             inner: FxHashSet::default(),
+            cut_facets: FxHashMap::default(),
             covered: Covered {
                 corner: Vector::zeros(),
                 edge: 1.0,
@@ -93,8 +96,26 @@ impl<const D: usize> Embedded<D> {
         }
     }
 
+    /// The rule of a facet with these corners, where only a part of it belongs to the surface: places and weights.
+    pub fn cut_facet(&self, corners: &[u32]) -> Option<&[(Vector<D>, f64)]> {
+        match self.cut_facets.is_empty() {
+            true => None,
+            false => {
+                let key = super::boundary::key(corners.iter().copied());
+                self.cut_facets.get(&key).map(Vec::as_slice)
+            }
+        }
+    }
+
+    /// Leaves of a facet, by its corners, a part with this rule of places \[m\] and weights [m^(D−1)].
+    pub fn cut_facet_to(&mut self, corners: &[u32], rule: Vec<(Vector<D>, f64)>) {
+        let key = super::boundary::key(corners.iter().copied());
+        self.cut_facets.insert(key, rule);
+    }
+
     /// Takes a facet, by its corners, out of the surface of the body.
     pub fn hide(&mut self, corners: &[u32]) {
-        self.inner.insert(super::boundary::key(corners.iter().copied()));
+        self.inner
+            .insert(super::boundary::key(corners.iter().copied()));
     }
 }

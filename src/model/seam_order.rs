@@ -74,7 +74,10 @@ impl Ties {
 
     fn add(&mut self, node: u32, followed: Vec<(u32, f64)>) {
         for &(other, weight) in &followed {
-            self.followers.entry(other).or_default().push((node, weight));
+            self.followers
+                .entry(other)
+                .or_default()
+                .push((node, weight));
         }
         self.followed.insert(node, followed);
     }

@@ -106,10 +106,10 @@ impl<const D: usize> Simplex<D> {
         moved
     }
 
-    /// The same with all corners drawn to a place, by a part of the way.
-    pub fn drawn_to(&self, place: &Vector<D>, part: f64) -> Self {
+    /// The same at another place.
+    pub fn shifted(&self, by: &Vector<D>) -> Self {
         let mut moved = *self;
-        moved.corners.iter_mut().for_each(|x| *x += (place - *x) * part);
+        moved.corners.iter_mut().for_each(|x| *x += by);
         moved
     }
 
@@ -291,7 +291,10 @@ fn has_plane_faces<const D: usize>(shape: CellShape, x: &[Vector<D>]) -> bool {
 }
 
 /// A facet as simplices.
-pub(in crate::model) fn facet_simplices<const D: usize>(mesh: &Mesh<D>, facet: &[u32]) -> Vec<Simplex<D>> {
+pub(in crate::model) fn facet_simplices<const D: usize>(
+    mesh: &Mesh<D>,
+    facet: &[u32],
+) -> Vec<Simplex<D>> {
     let facet = facet_corners::<D>(facet).iter();
     let x: Vec<Vector<D>> = facet.map(|&n| mesh.nodes[n as usize]).collect();
     match x.len() {
@@ -305,7 +308,10 @@ pub(in crate::model) fn facet_simplices<const D: usize>(mesh: &Mesh<D>, facet: &
 }
 
 /// The corners of a cell that is a box along the axes, if it is one.
-pub(in crate::model) fn as_box<const D: usize>(mesh: &Mesh<D>, c: usize) -> Option<(Vector<D>, Vector<D>)> {
+pub(in crate::model) fn as_box<const D: usize>(
+    mesh: &Mesh<D>,
+    c: usize,
+) -> Option<(Vector<D>, Vector<D>)> {
     let nodes = mesh.corners(c);
     let (low, high) = mesh.bounds_of(nodes);
     let at_corner = |x: &Vector<D>| (0..D).all(|i| x[i] == low[i] || x[i] == high[i]);

@@ -7,16 +7,14 @@ use super::error::{SceneError, SceneErrorKind};
 use super::initial;
 use super::region::{self, Region};
 use super::source::Span;
-use super::spec::{
-    CouplingSpec, LatticeStart, RimSpec, SceneSpec, TransitionSpec, TruncatedSpec,
-};
+use super::spec::{CouplingSpec, LatticeStart, RimSpec, SceneSpec, TransitionSpec, TruncatedSpec};
 use super::temperature;
 use super::validated::Scene;
 use super::zones::Placed;
 use crate::fem::Locator;
 use crate::mesh::facet_corners;
-use crate::model::{Reach, Zone};
 use crate::model::patch::{self, PatchError, PatchLattice, Patched};
+use crate::model::{Reach, Zone};
 use crate::observe::report::number;
 use crate::observe::summary::Decision;
 use crate::scene::conditions::Support;
@@ -66,7 +64,8 @@ pub(super) fn scene<const D: usize>(
         corner,
         spacing,
         per_cell: 1,
-        reach: reach(draft.spec, &before).map_err(|what| conflict(what, "or use rim = \"mesh\""))?,
+        reach: reach(draft.spec, &before)
+            .map_err(|what| conflict(what, "or use rim = \"mesh\""))?,
     };
     let (patched, per_cell) = embedded(draft, placed, &before, lattice)
         .map_err(|error| conflict(format!("`zones.rim`: {error}"), "or use rim = \"mesh\""))?;
@@ -89,7 +88,12 @@ pub(super) fn scene<const D: usize>(
     };
     let zone = Placed {
         nonlocal: patched.nonlocal,
-        span: draft.spec.zones.nonlocal.as_ref().map_or(span, |zone| zone.span()),
+        span: draft
+            .spec
+            .zones
+            .nonlocal
+            .as_ref()
+            .map_or(span, |zone| zone.span()),
     };
     let cell_material = (patched.origin.iter())
         .map(|&c| draft.cell_material[c as usize])
@@ -188,7 +192,9 @@ fn embedded<const D: usize>(
             Support::Set { nodes, .. } => nodes.iter().for_each(|&n| held[n as usize] = true),
             Support::Inside(region) => {
                 let inside = region.select_nodes(mesh);
-                held.iter_mut().zip(inside).for_each(|(held, is)| *held |= is);
+                held.iter_mut()
+                    .zip(inside)
+                    .for_each(|(held, is)| *held |= is);
             }
         }
     }
@@ -197,13 +203,9 @@ fn embedded<const D: usize>(
             per_cell,
             ..lattice
         };
-        patch::embed(
-            mesh,
-            lattice,
-            &is_wanted,
-            &|n| held[n as usize],
-            &|c| draft.cell_material[c as usize],
-        )
+        patch::embed(mesh, lattice, &is_wanted, &|n| held[n as usize], &|c| {
+            draft.cell_material[c as usize]
+        })
         .map(|patched| (patched, per_cell))
     };
     match draft.solve {
@@ -221,8 +223,7 @@ fn conflict_with<const D: usize>(
     draft: &Draft<'_, D>,
     patched: &Patched<D>,
 ) -> Option<String> {
-    let facets = condition.load().map(|load| load.on.facets());
-    let facets = facets.or_else(|| condition.term().map(|term| term.facets()));
+    let facets = condition.term().map(|term| term.facets());
     let of_support = condition.support().map(|support| match support {
         Support::Set { facets, .. } => facets.iter().map(Vec::as_slice).collect(),
         Support::Inside(_) => Vec::new(),
@@ -232,6 +233,17 @@ fn conflict_with<const D: usize>(
         corners.sort_unstable();
         patched.covered.contains(&corners)
     };
+    if let Some(load) = condition.load() {
+        let facets = load.on.facets();
+        let set = (patched.torn.iter()).find(|name| {
+            let set = draft.mesh.facet_sets.get(*name);
+            let held = set.into_iter().flatten().map(Vec::as_slice);
+            held.filter(is_covered).any(|facet| facets.contains(&facet))
+        });
+        return set.map(|name| {
+            format!("acts on `{name}`, whose edge divides a face of the zone or its rim")
+        });
+    }
     let all = facets.or(of_support).unwrap_or_default();
     if let Some(facet) = all.iter().find(|facet| is_covered(facet)) {
         let x = draft.mesh.bounds_of(facet).0;

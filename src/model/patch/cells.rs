@@ -91,7 +91,12 @@ impl<const D: usize> PatchCells<D> {
         let Some((from, to)) = extent(&wanted) else {
             return Err(empty);
         };
-        let held = held(mesh, &cells, from.map(|i| i - width - 2), to.map(|i| i + width + 2));
+        let held = held(
+            mesh,
+            &cells,
+            from.map(|i| i - width - 2),
+            to.map(|i| i + width + 2),
+        );
         let mut patch = Self {
             cells,
             zone: BTreeSet::new(),
@@ -269,9 +274,8 @@ fn held<const D: usize>(
     from: Index<D>,
     to: Index<D>,
 ) -> BTreeMap<Index<D>, Vec<(u32, f64)>> {
-    let meets = |low: &Index<D>, high: &Index<D>| {
-        (0..D).all(|i| low[i] <= to[i] && high[i] >= from[i])
-    };
+    let meets =
+        |low: &Index<D>, high: &Index<D>| (0..D).all(|i| low[i] <= to[i] && high[i] >= from[i]);
     let of_cell = |c: usize| {
         let mut parts: BTreeMap<Index<D>, f64> = BTreeMap::new();
         let (low, high) = mesh.bounds_of(mesh.corners(c));

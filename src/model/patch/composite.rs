@@ -6,18 +6,18 @@ use rustc_hash::FxHashSet;
 
 use super::{
     NodeRow, Patched,
-    cells::{Index, PatchCells, block},
+    cells::{Face, Index, PatchCells, block},
     cuts::Cuts,
     gathered,
+    surface::{MetFacet, met_facets},
 };
 use crate::{
     fem::Locator,
     mesh::{CellShape, Covered, Facet, Mesh, facet_corners},
-    model::simplex::facet_simplices,
 };
 
-/// Distance of a facet from its cell's inside at which its cells of the lattice are sought, over the way to the cell's middle.
-const INWARDS: f64 = 1e-6;
+/// Part of a face of the patch that may be outside a set of facets which holds it, by rounding.
+const HELD: f64 = 1e-6;
 
 const NONE: u32 = u32::MAX;
 
@@ -95,21 +95,24 @@ impl<const D: usize> Composite<D> {
                 nonlocal,
                 origin,
                 covered: FxHashSet::default(),
+                torn: FxHashSet::default(),
             },
             node,
             node_of_patch,
         };
-        composite.hide_facets(before, patch, cuts, &left);
+        let met = met_facets(before, patch, cuts);
+        composite.hide_facets(before, patch, &met, &left);
         composite.carry_sets(before, (&cell, of_patch));
+        composite.carry_facets(before, patch, &met, &cell);
         composite
     }
 
-    /// Takes the faces of the rim, and those that cells have lost the neighbour of, out of the surface.
+    /// Takes the faces of the rim, those that cells have lost the neighbour of, and what the patch covers out of the surface.
     fn hide_facets(
         &mut self,
         before: &Mesh<D>,
         patch: &PatchCells<D>,
-        cuts: &Cuts,
+        met: &BTreeMap<Vec<u32>, MetFacet<D>>,
         left: &[u32],
     ) {
         let embedded = &mut self.patched.mesh.embedded;
@@ -123,52 +126,96 @@ impl<const D: usize> Composite<D> {
             let corners = facet_corners::<D>(facet).iter();
             corners.map(|&n| self.node[n as usize]).collect()
         };
-        let mut lost: BTreeSet<Vec<u32>> = (before
-            .boundary_facets(left.iter().copied()))
+        let mut lost: BTreeSet<Vec<u32>> = (before.boundary_facets(left.iter().copied()))
             .iter()
             .map(|facet| sorted(renumbered(&facet.nodes)))
             .collect();
         for facet in before.outer_facets() {
             lost.remove(&sorted(renumbered(&facet.nodes)));
-            let cell = facet.cell;
-            if cuts.is_met(cell) && is_met(before, patch, &facet.nodes, cell as usize) {
-                let corners = facet_corners::<D>(&facet.nodes).to_vec();
-                self.patched.covered.insert(sorted(corners));
+        }
+        for (corners, facet) in met {
+            let own: Facet = corners.iter().map(|&n| self.node[n as usize]).collect();
+            match facet.left.is_empty() {
+                true => embedded.hide(&own),
+                false => embedded.cut_facet_to(&own, facet.left.clone()),
             }
+            self.patched.covered.insert(corners.clone());
         }
         lost.iter().for_each(|corners| embedded.hide(corners));
     }
 
     /// Carries the named sets over: cells and nodes that are left, the cells of the patch in sets of cells, and facets of cells that are left.
-    fn carry_sets(
-        &mut self,
-        before: &Mesh<D>,
-        (cell, of_patch): (&[u32], usize),
-    ) {
+    fn carry_sets(&mut self, before: &Mesh<D>, (cell, of_patch): (&[u32], usize)) {
         let mesh = &mut self.patched.mesh;
         for (name, set) in &before.cell_sets {
             let mut held = vec![false; before.cell_count()];
             set.iter().for_each(|&c| held[c as usize] = true);
             let of_patch = (0..of_patch).filter(|&c| held[self.patched.origin[c] as usize]);
-            let own = (set.iter()).filter_map(|&c| (cell[c as usize] != NONE).then_some(cell[c as usize]));
+            let own = (set.iter())
+                .filter_map(|&c| (cell[c as usize] != NONE).then_some(cell[c as usize]));
             let all = of_patch.map(|c| c as u32).chain(own).collect();
             mesh.cell_sets.insert(name.clone(), all);
         }
         let kept = |n: &u32| (self.node[*n as usize] != NONE).then_some(self.node[*n as usize]);
         for (name, set) in &before.node_sets {
-            mesh.node_sets.insert(name.clone(), set.iter().filter_map(kept).collect());
+            mesh.node_sets
+                .insert(name.clone(), set.iter().filter_map(kept).collect());
         }
+    }
+
+    /// Carries the named sets of facets over: what is left of them, and the faces of the patch on them.
+    fn carry_facets(
+        &mut self,
+        before: &Mesh<D>,
+        patch: &PatchCells<D>,
+        met: &BTreeMap<Vec<u32>, MetFacet<D>>,
+        cell: &[u32],
+    ) {
+        let corners = |facet: &[u32]| sorted(facet_corners::<D>(facet).to_vec());
         let surface: BTreeMap<Vec<u32>, u32> = (before.outer_facets().into_iter())
-            .map(|facet| (sorted(facet_corners::<D>(&facet.nodes).to_vec()), facet.cell))
+            .map(|facet| (corners(&facet.nodes), facet.cell))
             .collect();
+        let kept = |n: &u32| (self.node[*n as usize] != NONE).then_some(self.node[*n as usize]);
+        let size = patch.cells.spacing.powi(D as i32 - 1);
+        let number: BTreeMap<Index<D>, u32> = (patch.all.iter().copied()).zip(0..).collect();
         for (name, set) in &before.facet_sets {
-            let own = set.iter().filter_map(|facet| {
-                let owner = surface.get(&sorted(facet_corners::<D>(facet).to_vec()));
-                let nodes: Option<Facet> = facet.iter().map(kept).collect();
-                nodes.filter(|_| owner.is_none_or(|&c| cell[c as usize] != NONE))
-            });
-            mesh.facet_sets.insert(name.clone(), own.collect());
+            let mut own: Vec<Facet> = Vec::new();
+            let mut faces: BTreeMap<Face<D>, f64> = BTreeMap::new();
+            for facet in set {
+                let corners = corners(facet);
+                let found = met.get(&corners);
+                for (face, part) in found.iter().flat_map(|found| &found.faces) {
+                    *faces.entry(*face).or_insert(0.0) += part;
+                }
+                let is_gone = found.is_some_and(|found| found.left.is_empty())
+                    || (surface.get(&corners)).is_some_and(|&c| cell[c as usize] == NONE);
+                own.extend(
+                    facet
+                        .iter()
+                        .map(kept)
+                        .collect::<Option<Facet>>()
+                        .filter(|_| !is_gone),
+                );
+            }
+            for (face, part) in faces {
+                if part < (1.0 - HELD) * size {
+                    self.patched.torn.insert(name.clone());
+                }
+                own.extend(self.facet_of(&face, number[&face.cell]));
+            }
+            self.patched.mesh.facet_sets.insert(name.clone(), own);
         }
+    }
+
+    /// A face of the patch as a facet of its cell.
+    fn facet_of(&self, face: &Face<D>, cell: u32) -> Option<Facet> {
+        let mesh = &self.patched.mesh;
+        let wanted = sorted(face.nodes().iter().map(|n| self.node_of_patch[n]).collect());
+        let count = mesh.shapes[cell as usize].facets().len() as u8;
+        let facets = (0..count).map(|local| mesh.facet((cell, local)).nodes);
+        facets
+            .into_iter()
+            .find(|facet| sorted(facet.clone()) == wanted)
     }
 
     /// The mesh with the nodes that follow others: those of elements that are nearly gone by `bad`, in numbers of the mesh before, those of Γ by `rows`.
@@ -221,22 +268,4 @@ fn corners<const D: usize>(index: &Index<D>, node: &BTreeMap<Index<D>, u32>) -> 
 fn sorted(mut corners: Vec<u32>) -> Vec<u32> {
     corners.sort_unstable();
     corners
-}
-
-/// Returns true if the patch covers some of a facet of a cell.
-fn is_met<const D: usize>(
-    mesh: &Mesh<D>,
-    patch: &PatchCells<D>,
-    facet: &[u32],
-    cell: usize,
-) -> bool {
-    let middle = mesh.centroid(cell);
-    let mut is_met = false;
-    for simplex in facet_simplices(mesh, facet) {
-        let moved = simplex.drawn_to(&middle, INWARDS);
-        patch.cells.dice(&moved, &|_, _| true, &mut |index, _| {
-            is_met |= patch.all.contains(&index);
-        });
-    }
-    is_met
 }

@@ -24,10 +24,7 @@ pub(super) struct Cuts {
 }
 
 impl Cuts {
-    pub fn new<const D: usize>(
-        mesh: &Mesh<D>,
-        patch: &PatchCells<D>,
-    ) -> Result<Self, PatchError> {
+    pub fn new<const D: usize>(mesh: &Mesh<D>, patch: &PatchCells<D>) -> Result<Self, PatchError> {
         let mut met: Vec<u32> = (patch.all.iter())
             .flat_map(|index| patch.held[index].iter().map(|part| part.0))
             .collect();
@@ -99,18 +96,20 @@ fn part_outside<const D: usize>(
     let (mut volume, mut first, mut second) = (0.0, Vector::<D>::zeros(), Tensor::<D>::zeros());
     let mut inside = 0.0;
     for simplex in simplices_of(mesh, c) {
-        patch.cells.dice(&simplex, &|_, _| true, &mut |index, part| {
-            if patch.all.contains(&index) {
-                inside += part.size();
-                return;
-            }
-            part.quadrature(|x, w| {
-                let x = x - about;
-                volume += w;
-                first += x * w;
-                second += x * x.transpose() * w;
+        patch
+            .cells
+            .dice(&simplex, &|_, _| true, &mut |index, part| {
+                if patch.all.contains(&index) {
+                    inside += part.size();
+                    return;
+                }
+                part.quadrature(|x, w| {
+                    let x = x - about;
+                    volume += w;
+                    first += x * w;
+                    second += x * x.transpose() * w;
+                });
             });
-        });
     }
     let centroid = first / volume;
     let second = second / volume - centroid * centroid.transpose();

@@ -44,7 +44,11 @@ pub(super) fn followers<const D: usize>(
             if had {
                 break;
             }
-            reached = ring.iter().flat_map(|&c| mesh.cell(c as usize)).copied().collect();
+            reached = ring
+                .iter()
+                .flat_map(|&c| mesh.cell(c as usize))
+                .copied()
+                .collect();
             reached.sort_unstable();
             reached.dedup();
             reached.retain(|n| seen.binary_search(n).is_err());

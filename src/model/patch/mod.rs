@@ -6,6 +6,7 @@
 //! | `cuts.rs` | elements that Γ cuts: what is left of them |
 //! | `tie.rs` | the displacement of the nodes of Γ, by a dual mortar |
 //! | `followers.rs` | nodes that no good element holds |
+//! | `surface.rs` | facets at the surface of the body that the patch covers |
 //! | `composite.rs` | zone, rim and what is left of the elements as one mesh |
 //!
 //! The peridynamic zone is a union of lattice cells. Around it lies a *rim* of elements on the same lattice, so that a coupling sees a seam that follows the lattice, whatever the mesh is. The elements of the mesh end at Γ, the outer face of the rim:
@@ -23,6 +24,7 @@ mod cells;
 mod composite;
 mod cuts;
 mod followers;
+mod surface;
 mod tie;
 
 #[cfg(test)]
@@ -41,13 +43,17 @@ use crate::{
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PatchError {
     /// No cell of the lattice has its centre in the zone and lies within the body.
-    #[error("no cell of the lattice, of edge {edge}, lies in the zone and within the body; make the zone larger or the spacing smaller")]
+    #[error(
+        "no cell of the lattice, of edge {edge}, lies in the zone and within the body; make the zone larger or the spacing smaller"
+    )]
     Empty {
         /// Edge of the cells \[m\].
         edge: f64,
     },
     /// A cell of the rim lies in the body in part.
-    #[error("the surface of the body cuts the rim of the zone at {position:?}: {percent:.1} % of a lattice cell lies within; keep the zone two spacings and a cell away from the surface, or let a plane of the lattice's cells be that surface (peridynamics.points.lattice.origin)")]
+    #[error(
+        "the surface of the body cuts the rim of the zone at {position:?}: {percent:.1} % of a lattice cell lies within; keep the zone two spacings and a cell away from the surface, or let a plane of the lattice's cells be that surface (peridynamics.points.lattice.origin)"
+    )]
     Surface {
         /// Middle of the cell \[m\].
         position: Vec<f64>,
@@ -55,7 +61,9 @@ pub enum PatchError {
         percent: f64,
     },
     /// The outer face of the rim cuts a cell of a kind that it may not.
-    #[error("cell {cell}, a {shape:?}, at {position:?}, is cut by the rim of the zone; only lines, triangles, tetrahedra, and rectangles and cuboids along the axes may be")]
+    #[error(
+        "cell {cell}, a {shape:?}, at {position:?}, is cut by the rim of the zone; only lines, triangles, tetrahedra, and rectangles and cuboids along the axes may be"
+    )]
     Kind {
         /// Number of the cell.
         cell: usize,
@@ -65,13 +73,17 @@ pub enum PatchError {
         position: Vec<f64>,
     },
     /// Cells of several materials meet in the patch.
-    #[error("the zone or its rim holds two materials at {position:?}; keep both away from the border of materials")]
+    #[error(
+        "the zone or its rim holds two materials at {position:?}; keep both away from the border of materials"
+    )]
     Materials {
         /// Middle of the cell of the lattice \[m\].
         position: Vec<f64>,
     },
     /// No element near a node of the mesh is left.
-    #[error("node {node} at {position:?} keeps no element of which enough is left beside the rim of the zone; refine the mesh there, or move the zone")]
+    #[error(
+        "node {node} at {position:?} keeps no element of which enough is left beside the rim of the zone; refine the mesh there, or move the zone"
+    )]
     Alone {
         /// Number of the node.
         node: u32,
@@ -79,7 +91,9 @@ pub enum PatchError {
         position: Vec<f64>,
     },
     /// A node would have no mass.
-    #[error("the elements that are left at {position:?} beside the rim of the zone give a node the volume {volume:.3e}; move the zone, or refine the mesh there")]
+    #[error(
+        "the elements that are left at {position:?} beside the rim of the zone give a node the volume {volume:.3e}; move the zone, or refine the mesh there"
+    )]
     Mass {
         /// Position of the node \[m\].
         position: Vec<f64>,
@@ -99,6 +113,8 @@ pub struct Patched<const D: usize> {
     pub origin: Vec<u32>,
     /// Facets of the surface of which the patch covers a part: their corners in the mesh before, sorted.
     pub covered: FxHashSet<Vec<u32>>,
+    /// Named sets of facets that hold a part of a face of the patch.
+    pub torn: FxHashSet<String>,
     /// Cells of the rim.
     pub rim: usize,
 }

@@ -67,7 +67,10 @@ pub(super) fn rows<const D: usize>(
             row.map(move |&(n, w)| (n, -w * d))
         });
         let row = gathered(own.into_iter().chain(others));
-        rows.insert(node, row.into_iter().map(|(n, w)| (n, w / diagonal)).collect());
+        rows.insert(
+            node,
+            row.into_iter().map(|(n, w)| (n, w / diagonal)).collect(),
+        );
     }
     Ok(rows)
 }
@@ -116,15 +119,19 @@ fn face_rows<const D: usize>(
         });
     }
     let moments = &psi * &dual.mass * size;
-    let rows = kept.iter().zip(of_mesh).enumerate().map(|(k, (&own, row))| {
-        let others = (0..nodes.len()).filter(|j| !kept.contains(j));
-        (
-            nodes[own],
-            moments[(k, own)],
-            others.map(|j| (nodes[j], moments[(k, j)])).collect(),
-            gathered(row),
-        )
-    });
+    let rows = kept
+        .iter()
+        .zip(of_mesh)
+        .enumerate()
+        .map(|(k, (&own, row))| {
+            let others = (0..nodes.len()).filter(|j| !kept.contains(j));
+            (
+                nodes[own],
+                moments[(k, own)],
+                others.map(|j| (nodes[j], moments[(k, j)])).collect(),
+                gathered(row),
+            )
+        });
     Ok(FaceRows {
         rows: rows.collect(),
     })
@@ -146,13 +153,15 @@ fn sections<const D: usize>(
         for section in simplex.section(axis, at) {
             // within its cells, so that the plane is none between two of them
             let flat = section.moved_to(axis, middle);
-            patch.cells.dice(&flat, &|low, high| {
-                (0..D).all(|i| low[i] <= face.cell[i] && high[i] >= face.cell[i])
-            }, &mut |index, part| {
-                if index == face.cell {
-                    parts.push(part.moved_to(axis, plane));
-                }
-            });
+            patch.cells.dice(
+                &flat,
+                &|low, high| (0..D).all(|i| low[i] <= face.cell[i] && high[i] >= face.cell[i]),
+                &mut |index, part| {
+                    if index == face.cell {
+                        parts.push(part.moved_to(axis, plane));
+                    }
+                },
+            );
         }
     }
     parts
@@ -163,10 +172,13 @@ fn shape_on_face<const D: usize>(s: &Vector<D>, axis: usize) -> Vec<f64> {
     let within: Vec<usize> = (0..D).filter(|&k| k != axis).collect();
     (0..1usize << within.len())
         .map(|bits| {
-            let factors = within.iter().enumerate().map(|(k, &i)| match bits >> k & 1 {
-                1 => s[i],
-                _ => 1.0 - s[i],
-            });
+            let factors = within
+                .iter()
+                .enumerate()
+                .map(|(k, &i)| match bits >> k & 1 {
+                    1 => s[i],
+                    _ => 1.0 - s[i],
+                });
             factors.product()
         })
         .collect()

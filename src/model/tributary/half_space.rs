@@ -1,9 +1,9 @@
 //! Quadrature over the parts of cells and facets beyond a plane.
 
-use crate::model::simplex::{Simplex, facet_simplices, simplices_of};
 use crate::fem;
 use crate::mesh::Mesh;
 use crate::mesh::boundary::{BoundaryFacet, normal_area};
+use crate::model::simplex::{Simplex, facet_simplices, simplices_of};
 use crate::tensor::Vector;
 
 /// Half-space beyond a plane.

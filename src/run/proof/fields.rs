@@ -53,7 +53,13 @@ pub(super) fn boundary_integrals<const D: usize>(model: &Model<D>) -> Vec<(u32, 
     let mut list = Vec::new();
     let mut add = |facet: &BoundaryFacet| {
         for (n, share) in facet.nodes.iter().zip(shares(mesh, facet)) {
-            list.push((*n, facet.cell, share));
+            match model.followed_nodes(*n) {
+                Some(followed) => {
+                    let all = followed.iter();
+                    list.extend(all.map(|&(m, w)| (m, facet.cell, share * w)));
+                }
+                None => list.push((*n, facet.cell, share)),
+            }
         }
     };
     let outer = mesh.outer_facets();
@@ -80,7 +86,8 @@ pub(super) fn boundary_integrals<const D: usize>(model: &Model<D>) -> Vec<(u32, 
 /// `∫ N_a n dA` of each node of a facet.
 fn shares<const D: usize>(mesh: &Mesh<D>, facet: &BoundaryFacet) -> Vec<Vector<D>> {
     let count = facet.nodes.len();
-    if facet_corners::<D>(&facet.nodes).len() < count {
+    let corners = facet_corners::<D>(&facet.nodes);
+    if corners.len() < count || mesh.embedded.cut_facet(corners).is_some() {
         return fem::facet_normals(mesh, &facet.nodes);
     }
     let area = mesh.facet_normal_area(facet);
