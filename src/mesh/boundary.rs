@@ -125,6 +125,7 @@ impl<const D: usize> Mesh<D> {
         let mut facets = self.boundary_facets(0..self.cell_count() as u32);
         if !self.embedded.inner.is_empty() {
             facets.retain(|facet| !self.embedded.inner.contains(&facet.key::<D>()));
+            facets.extend_from_slice(&self.embedded.surface);
         }
         facets
     }

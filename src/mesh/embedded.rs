@@ -7,7 +7,9 @@ use std::collections::BTreeMap;
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::tensor::Vector;
+use super::Facet;
+use super::boundary::BoundaryFacet;
+use crate::tensor::{Tensor, Vector, inverse};
 
 /// A quadrature rule of a cut cell: reference coordinates and weights.
 pub type CutRule = Vec<([f64; 3], f64)>;
@@ -34,6 +36,10 @@ pub struct Embedded<const D: usize> {
     pub(super) inner: FxHashSet<[u32; 4]>,
     /// Facets of which only a part belongs to the surface, by their sorted corners, with a rule for the part.
     pub(super) cut_facets: FxHashMap<[u32; 4], Vec<(Vector<D>, f64)>>,
+    /// The part of each cell of the patch that the surface of the body cuts, as simplices; corners beyond `D + 1` have no meaning.
+    pub pieces: FxHashMap<u32, Vec<[Vector<D>; 4]>>,
+    /// The surface of the body in cells that it crosses: its nodes belong to no cell.
+    pub(super) surface: Vec<BoundaryFacet>,
     /// The place of the patch.
     pub covered: Covered<D>,
 }
@@ -56,6 +62,8 @@ impl<const D: usize> Default for Embedded<D> {
             followers: BTreeMap::new(),
             inner: FxHashSet::default(),
             cut_facets: FxHashMap::default(),
+            pieces: FxHashMap::default(),
+            surface: Vec::new(),
             covered: Covered {
                 corner: Vector::zeros(),
                 edge: 1.0,
@@ -82,10 +90,26 @@ impl<const D: usize> Covered<D> {
 }
 
 impl<const D: usize> Embedded<D> {
-    /// Returns true if a position lies in the part of a cell that a patch took.
+    /// Returns true if a position lies in the part of a cell that is none of the body: which a patch took, or which lies beyond the surface.
     pub fn is_taken(&self, c: usize, x: &Vector<D>) -> bool {
-        self.cut_cell(c).is_some() && self.covered.holds(x)
+        self.cut_cell(c).is_some()
+            && match self.pieces.get(&(c as u32)) {
+                None => self.covered.holds(x),
+                Some(pieces) => !pieces.iter().any(|piece| in_simplex(piece, x)),
+            }
     }
+
+    /// Adds a facet to the surface of the body in a cell that it crosses; its nodes, of which the normal points outwards, belong to no cell.
+    pub fn add_surface(&mut self, cell: u32, nodes: Facet) {
+        self.surface.push(BoundaryFacet {
+            nodes,
+            cell,
+            local: Self::CROSSING,
+        });
+    }
+
+    /// Number of a facet within its cell that stands for the surface that crosses the cell.
+    pub const CROSSING: u8 = u8::MAX;
 
     /// The rules of a cell, where only a part of it belongs to the body.
     #[inline]
@@ -118,4 +142,15 @@ impl<const D: usize> Embedded<D> {
         self.inner
             .insert(super::boundary::key(corners.iter().copied()));
     }
+}
+
+/// Returns true if a position lies in a simplex, or within rounding of it.
+fn in_simplex<const D: usize>(corners: &[Vector<D>; 4], x: &Vector<D>) -> bool {
+    const SLACK: f64 = 1e-9;
+    let edges = Tensor::<D>::from_fn(|i, k| (corners[k + 1] - corners[0])[i]);
+    let Some((inverse, _)) = inverse(&edges) else {
+        return false;
+    };
+    let t = inverse * (x - corners[0]);
+    t.iter().all(|t| *t >= -SLACK) && t.sum() <= 1.0 + SLACK
 }

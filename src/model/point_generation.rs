@@ -250,6 +250,10 @@ impl<'a, const D: usize> LatticeSampler<'a, D> {
             let (lo, hi) = mesh.bounds_of(&facet.nodes);
             self.lattice.mark(&mut self.edge, &lo, &hi);
         }
+        for &c in mesh.embedded.pieces.keys().filter(|&&c| mine[c as usize]) {
+            let (lo, hi) = mesh.bounds_of(mesh.cell(c as usize));
+            self.lattice.mark(&mut self.edge, &lo, &hi);
+        }
     }
 
     /// Marks the points that families of the region reach.

@@ -226,6 +226,9 @@ impl<const D: usize> Cells<D> {
 /// The corners of a cell of a mesh as simplices: a quadrilateral as two triangles, a hexahedron with plane faces as six tetrahedra around its diagonal. Any other solid is divided from its centre, a bent face from
 /// its own: the volume of a trilinear hexahedron is that of these 24 tetrahedra [Grandy 1997, UCRL-ID-128886], and neighbours divide their face alike.
 pub(in crate::model) fn simplices_of<const D: usize>(mesh: &Mesh<D>, c: usize) -> Vec<Simplex<D>> {
+    if let Some(pieces) = mesh.embedded.pieces.get(&(c as u32)) {
+        return pieces.iter().map(|x| Simplex::of(&x[..=D])).collect();
+    }
     let x: Vec<Vector<D>> = mesh
         .corners(c)
         .iter()
@@ -312,6 +315,9 @@ pub(in crate::model) fn as_box<const D: usize>(
     mesh: &Mesh<D>,
     c: usize,
 ) -> Option<(Vector<D>, Vector<D>)> {
+    if mesh.embedded.cut_cell(c).is_some() {
+        return None;
+    }
     let nodes = mesh.corners(c);
     let (low, high) = mesh.bounds_of(nodes);
     let at_corner = |x: &Vector<D>| (0..D).all(|i| x[i] == low[i] || x[i] == high[i]);

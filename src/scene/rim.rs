@@ -210,7 +210,7 @@ fn embedded<const D: usize>(
     };
     match draft.solve {
         Solve::Explicit(_) => match embed(PER_CELL) {
-            Err(PatchError::Surface { .. } | PatchError::Empty { .. }) => embed(1),
+            Err(PatchError::Empty { .. }) => embed(1),
             found => found,
         },
         Solve::Static | Solve::QuasiStatic(_) => embed(1),

@@ -5,13 +5,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::PatchError;
 use crate::{
     mesh::Mesh,
-    model::simplex::{Cells, simplices_of},
+    model::simplex::{Cells, Simplex, simplices_of},
     parallel,
     tensor::Vector,
 };
 
 /// Part of a cell's volume below which it is none, and above which less one it is whole.
 const PART: f64 = 1e-9;
+
+/// Part of an element's volume in the body that its nodes need to follow no others.
+pub(super) const GOOD: f64 = 0.3;
 
 /// A cell of the lattice.
 pub(super) type Index<const D: usize> = [i32; D];
@@ -104,19 +107,19 @@ impl<const D: usize> PatchCells<D> {
             held,
         };
         patch.zone = (wanted.into_iter())
-            .filter(|index| patch.part(index) > 1.0 - PART)
+            .filter(|index| patch.is_material(index))
             .collect();
         if patch.zone.is_empty() {
             return Err(empty);
         }
         for index in patch.zone.clone() {
             for other in block(index.map(|i| i - width), index.map(|i| i + width)) {
-                patch.add(other)?;
+                patch.add(other);
             }
         }
         while let Some(missing) = patch.missing() {
             for index in missing {
-                patch.add(index)?;
+                patch.add(index);
             }
         }
         Ok(patch)
@@ -138,7 +141,7 @@ impl<const D: usize> PatchCells<D> {
     }
 
     /// Part of a cell that lies in the body.
-    fn part(&self, index: &Index<D>) -> f64 {
+    pub fn part(&self, index: &Index<D>) -> f64 {
         let volume: f64 = (self.held.get(index)).map_or(0.0, |own| own.iter().map(|p| p.1).sum());
         volume / self.cells.spacing.powi(D as i32)
     }
@@ -148,24 +151,38 @@ impl<const D: usize> PatchCells<D> {
         self.part(index) > PART
     }
 
-    /// Takes a cell into the patch, if it lies in the body.
-    fn add(&mut self, index: Index<D>) -> Result<(), PatchError> {
-        let part = self.part(&index);
-        if part <= PART {
-            return Ok(());
+    /// Takes a cell into the patch, if any of it lies in the body.
+    fn add(&mut self, index: Index<D>) {
+        if self.is_material(&index) {
+            self.all.insert(index);
         }
-        if part <= 1.0 - PART {
-            return Err(PatchError::Surface {
-                position: self.cells.centre(&index).iter().copied().collect(),
-                percent: 100.0 * part,
-            });
-        }
-        self.all.insert(index);
-        Ok(())
+    }
+
+    /// Returns true if the surface of the body cuts a cell of the patch.
+    pub fn is_cut(&self, index: &Index<D>) -> bool {
+        self.part(index) < 1.0 - PART
+    }
+
+    /// Returns true if a cell is one of the rim.
+    pub fn is_rim(&self, index: &Index<D>) -> bool {
+        self.all.contains(index) && !self.zone.contains(index)
+    }
+
+    /// Returns true if no element of the rim around a node has enough of its volume in the body.
+    pub fn is_bad(&self, node: &Index<D>) -> bool {
+        let mut around = block(node.map(|i| i - 1), *node);
+        !around.any(|cell| self.is_rim(&cell) && self.part(&cell) >= GOOD)
     }
 
     /// The faces between the patch and the body beyond it.
     pub fn faces(&self) -> Vec<Face<D>> {
+        let mut faces = self.outer_faces();
+        faces.retain(|face| self.is_material(&face.neighbour()));
+        faces
+    }
+
+    /// The faces at which the patch ends.
+    pub fn outer_faces(&self) -> Vec<Face<D>> {
         let mut faces = Vec::new();
         for &cell in &self.all {
             for axis in 0..D {
@@ -175,8 +192,7 @@ impl<const D: usize> PatchCells<D> {
                         axis,
                         is_upper,
                     };
-                    let other = face.neighbour();
-                    if !self.all.contains(&other) && self.is_material(&other) {
+                    if !self.all.contains(&face.neighbour()) {
                         faces.push(face);
                     }
                 }
@@ -203,7 +219,8 @@ impl<const D: usize> PatchCells<D> {
         let axes = Self::axes(&faces);
         let mut missing = BTreeSet::new();
         for face in &faces {
-            if face.nodes().iter().all(|node| axes[node] != face.axis) {
+            let is_kept = |node: &Index<D>| axes[node] == face.axis && !self.is_bad(node);
+            if !face.nodes().iter().any(is_kept) {
                 missing.insert(face.neighbour());
             }
         }
@@ -216,6 +233,24 @@ impl<const D: usize> PatchCells<D> {
             }
         }
         (!missing.is_empty()).then_some(missing)
+    }
+
+    /// The part of a cell in the body, as simplices.
+    pub fn pieces(&self, mesh: &Mesh<D>, index: &Index<D>) -> Vec<Simplex<D>> {
+        let mut pieces = Vec::new();
+        for &(c, _) in &self.held[index] {
+            let is_here = |low: &Index<D>, high: &Index<D>| {
+                (0..D).all(|i| low[i] <= index[i] && high[i] >= index[i])
+            };
+            for simplex in simplices_of(mesh, c as usize) {
+                self.cells.dice(&simplex, &is_here, &mut |at, part| {
+                    if at == *index {
+                        pieces.push(*part);
+                    }
+                });
+            }
+        }
+        pieces
     }
 
     /// Position of a node of the lattice's cells.

@@ -5,15 +5,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use rustc_hash::FxHashSet;
 
 use super::{
-    NodeRow, Patched,
+    PartMoments, Patched, Place, Rows,
     cells::{Face, Index, PatchCells, block},
     cuts::Cuts,
-    gathered,
-    surface::{MetFacet, met_facets},
+    surface::PatchSurface,
 };
 use crate::{
-    fem::Locator,
-    mesh::{CellShape, Covered, Facet, Mesh, facet_corners},
+    fem::{self, Locator},
+    mesh::{CellShape, Covered, Facet, Mesh, boundary::BoundaryFacet, facet_corners},
 };
 
 /// Part of a face of the patch that may be outside a set of facets which holds it, by rounding.
@@ -61,8 +60,7 @@ impl<const D: usize> Composite<D> {
                 });
             }
         }
-        let mut nonlocal = Vec::new();
-        let mut origin = Vec::new();
+        let (mut nonlocal, mut origin) = (Vec::new(), Vec::new());
         let locator = Locator::new(before, 0..before.cell_count());
         for index in &patch.all {
             mesh.push_cell(shape::<D>(), &corners(index, &node_of_patch));
@@ -74,6 +72,7 @@ impl<const D: usize> Composite<D> {
                 |found| found.cell as u32,
             ));
         }
+        cut_patch_cells(before, patch, &mut mesh);
         let of_patch = origin.len();
         let mut cell = vec![NONE; before.cell_count()];
         for &c in &left {
@@ -100,27 +99,35 @@ impl<const D: usize> Composite<D> {
             node,
             node_of_patch,
         };
-        let met = met_facets(before, patch, cuts);
-        composite.hide_facets(before, patch, &met, &left);
+        let surface = PatchSurface::new(before, patch, cuts);
+        composite.hide_facets(before, patch, &surface, &left);
+        composite.add_surface(patch, &surface);
         composite.carry_sets(before, (&cell, of_patch));
-        composite.carry_facets(before, patch, &met, &cell);
+        composite.carry_facets(before, patch, &surface, &cell);
         composite
     }
 
-    /// Takes the faces of the rim, those that cells have lost the neighbour of, and what the patch covers out of the surface.
+    /// Takes out of the surface the faces of the patch that are none of the body, those that cells have lost the neighbour of, and what the patch covers.
     fn hide_facets(
         &mut self,
         before: &Mesh<D>,
         patch: &PatchCells<D>,
-        met: &BTreeMap<Vec<u32>, MetFacet<D>>,
+        surface: &PatchSurface<D>,
         left: &[u32],
     ) {
         let embedded = &mut self.patched.mesh.embedded;
-        for face in patch.faces() {
+        let size = patch.cells.spacing.powi(D as i32 - 1);
+        for face in patch.outer_faces() {
             let nodes: Vec<u32> = (face.nodes().iter())
                 .map(|n| self.node_of_patch[n])
                 .collect();
-            embedded.hide(&nodes);
+            match surface.faces.get(&face) {
+                None => embedded.hide(&nodes),
+                Some(part) if part.size < (1.0 - HELD) * size => {
+                    embedded.cut_facet_to(&nodes, part.rule());
+                }
+                Some(_) => {}
+            }
         }
         let renumbered = |facet: &Facet| -> Vec<u32> {
             let corners = facet_corners::<D>(facet).iter();
@@ -133,15 +140,35 @@ impl<const D: usize> Composite<D> {
         for facet in before.outer_facets() {
             lost.remove(&sorted(renumbered(&facet.nodes)));
         }
-        for (corners, facet) in met {
+        for (corners, facet) in &surface.met {
             let own: Facet = corners.iter().map(|&n| self.node[n as usize]).collect();
-            match facet.left.is_empty() {
+            match facet.is_gone {
                 true => embedded.hide(&own),
-                false => embedded.cut_facet_to(&own, facet.left.clone()),
+                false => embedded.cut_facet_to(&own, facet.left.rule()),
             }
             self.patched.covered.insert(corners.clone());
         }
         lost.iter().for_each(|corners| embedded.hide(corners));
+    }
+
+    /// Adds the surface that crosses cells of the patch.
+    fn add_surface(&mut self, patch: &PatchCells<D>, surface: &PatchSurface<D>) {
+        let number: BTreeMap<Index<D>, u32> = (patch.all.iter().copied()).zip(0..).collect();
+        let mesh = &mut self.patched.mesh;
+        for (index, part, normal) in &surface.parts {
+            let first = mesh.nodes.len() as u32;
+            mesh.nodes.extend_from_slice(&part.corners[..part.count]);
+            let mut nodes: Facet = (first..mesh.nodes.len() as u32).collect();
+            let facet = BoundaryFacet {
+                nodes: nodes.clone(),
+                cell: number[index],
+                local: 0,
+            };
+            if D > 1 && mesh.facet_normal_area(&facet).dot(normal) < 0.0 {
+                nodes.swap(0, 1);
+            }
+            mesh.embedded.add_surface(number[index], nodes);
+        }
     }
 
     /// Carries the named sets over: cells and nodes that are left, the cells of the patch in sets of cells, and facets of cells that are left.
@@ -168,11 +195,11 @@ impl<const D: usize> Composite<D> {
         &mut self,
         before: &Mesh<D>,
         patch: &PatchCells<D>,
-        met: &BTreeMap<Vec<u32>, MetFacet<D>>,
+        surface: &PatchSurface<D>,
         cell: &[u32],
     ) {
         let corners = |facet: &[u32]| sorted(facet_corners::<D>(facet).to_vec());
-        let surface: BTreeMap<Vec<u32>, u32> = (before.outer_facets().into_iter())
+        let owner: BTreeMap<Vec<u32>, u32> = (before.outer_facets().into_iter())
             .map(|facet| (corners(&facet.nodes), facet.cell))
             .collect();
         let kept = |n: &u32| (self.node[*n as usize] != NONE).then_some(self.node[*n as usize]);
@@ -183,12 +210,12 @@ impl<const D: usize> Composite<D> {
             let mut faces: BTreeMap<Face<D>, f64> = BTreeMap::new();
             for facet in set {
                 let corners = corners(facet);
-                let found = met.get(&corners);
+                let found = surface.met.get(&corners);
                 for (face, part) in found.iter().flat_map(|found| &found.faces) {
                     *faces.entry(*face).or_insert(0.0) += part;
                 }
-                let is_gone = found.is_some_and(|found| found.left.is_empty())
-                    || (surface.get(&corners)).is_some_and(|&c| cell[c as usize] == NONE);
+                let is_gone = found.is_some_and(|found| found.is_gone)
+                    || (owner.get(&corners)).is_some_and(|&c| cell[c as usize] == NONE);
                 own.extend(
                     facet
                         .iter()
@@ -218,28 +245,36 @@ impl<const D: usize> Composite<D> {
             .find(|facet| sorted(facet.clone()) == wanted)
     }
 
-    /// The mesh with the nodes that follow others: those of elements that are nearly gone by `bad`, in numbers of the mesh before, those of Γ by `rows`.
-    pub fn with_followers(
-        self,
-        bad: &BTreeMap<u32, NodeRow>,
-        rows: &BTreeMap<Index<D>, NodeRow>,
-    ) -> Patched<D> {
+    /// The mesh with the nodes that follow others.
+    pub fn with_followers(self, rows: &Rows<D>) -> Patched<D> {
         let mut patched = self.patched;
-        let renumbered = |row: &NodeRow| -> NodeRow {
-            let followed = row.iter().flat_map(|&(n, w)| match bad.get(&n) {
-                Some(others) => others.iter().map(|&(m, v)| (m, v * w)).collect(),
-                None => vec![(n, w)],
-            });
-            gathered(followed.map(|(n, w)| (self.node[n as usize], w)))
+        let number = |place: &Place<D>| match place {
+            Place::Mesh(n) => self.node[*n as usize],
+            Place::Patch(node) => self.node_of_patch[node],
         };
-        let followers = &mut patched.mesh.embedded.followers;
-        for (&n, row) in bad {
-            followers.insert(self.node[n as usize], renumbered(row));
-        }
-        for (node, row) in rows {
-            followers.insert(self.node_of_patch[node], renumbered(row));
-        }
+        let followers = rows.iter().map(|(place, row)| {
+            let row = row.iter().map(|(followed, w)| (number(followed), *w));
+            (number(place), row.collect())
+        });
+        patched.mesh.embedded.followers = followers.collect();
         patched
+    }
+}
+
+/// Gives the cells of the patch that the surface of the body cuts their rules and pieces.
+fn cut_patch_cells<const D: usize>(before: &Mesh<D>, patch: &PatchCells<D>, mesh: &mut Mesh<D>) {
+    for (c, index) in patch.all.iter().enumerate() {
+        if !patch.is_cut(index) {
+            continue;
+        }
+        let pieces = patch.pieces(before, index);
+        let mut part = PartMoments::about(patch.cells.centre(index));
+        pieces.iter().for_each(|piece| part.add(piece));
+        if let Some(rule) = fem::rule_of_part(mesh, c, part.central()) {
+            mesh.embedded.cut.insert(c as u32, rule);
+        }
+        let pieces = pieces.iter().map(|piece| piece.corners).collect();
+        mesh.embedded.pieces.insert(c as u32, pieces);
     }
 }
 

@@ -2,20 +2,20 @@
 
 use std::collections::BTreeMap;
 
-use super::{PatchError, cells::PatchCells, may_be_cut};
+use super::{
+    PartMoments, PatchError,
+    cells::{GOOD, PatchCells},
+    may_be_cut,
+};
 use crate::{
     fem,
     mesh::{CutCell, Mesh},
     model::simplex::simplices_of,
     parallel,
-    tensor::{Tensor, Vector},
 };
 
 /// Part of a cell's volume below which nothing is left of it.
 const NOTHING: f64 = 1e-10;
-
-/// Part of a cell's volume that must be left for its nodes to follow no others.
-const GOOD: f64 = 0.3;
 
 /// The elements that a patch cuts.
 pub(super) struct Cuts {
@@ -32,16 +32,16 @@ impl Cuts {
         met.dedup();
         let found = parallel::map(met.len(), 8, |k| {
             let c = met[k] as usize;
-            let (volume, centroid, second, inside) = part_outside(mesh, patch, c);
+            let (outside, inside) = parts(mesh, patch, c);
             let whole = mesh.cell_volume(c).abs();
-            if volume <= NOTHING * whole {
+            if outside.size <= NOTHING * whole {
                 return Ok(Some((met[k], None)));
             }
             if inside <= NOTHING * whole {
                 return Ok(None);
             }
             let rule = may_be_cut(mesh, c)
-                .then(|| fem::rule_of_part(mesh, c, (volume, centroid, second)))
+                .then(|| fem::rule_of_part(mesh, c, outside.central()))
                 .flatten();
             match rule {
                 Some(rule) => Ok(Some((met[k], Some(rule)))),
@@ -86,32 +86,19 @@ impl Cuts {
     }
 }
 
-/// Volume, centroid and second moment about it, over the volume, of what lies outside the patch, and the volume inside.
-fn part_outside<const D: usize>(
-    mesh: &Mesh<D>,
-    patch: &PatchCells<D>,
-    c: usize,
-) -> (f64, Vector<D>, Tensor<D>, f64) {
-    let about = mesh.centroid(c);
-    let (mut volume, mut first, mut second) = (0.0, Vector::<D>::zeros(), Tensor::<D>::zeros());
+/// What of a cell lies outside the patch, and the volume inside.
+fn parts<const D: usize>(mesh: &Mesh<D>, patch: &PatchCells<D>, c: usize) -> (PartMoments<D>, f64) {
+    let mut outside = PartMoments::about(mesh.centroid(c));
     let mut inside = 0.0;
     for simplex in simplices_of(mesh, c) {
-        patch
-            .cells
-            .dice(&simplex, &|_, _| true, &mut |index, part| {
-                if patch.all.contains(&index) {
-                    inside += part.size();
-                    return;
-                }
-                part.quadrature(|x, w| {
-                    let x = x - about;
-                    volume += w;
-                    first += x * w;
-                    second += x * x.transpose() * w;
-                });
-            });
+        patch.cells.dice(
+            &simplex,
+            &|_, _| true,
+            &mut |index, part| match patch.all.contains(&index) {
+                true => inside += part.size(),
+                false => outside.add(part),
+            },
+        );
     }
-    let centroid = first / volume;
-    let second = second / volume - centroid * centroid.transpose();
-    (volume, about + centroid, second, inside)
+    (outside, inside)
 }

@@ -30,13 +30,20 @@ mod tie;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
+
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use self::{cells::PatchCells, composite::Composite, cuts::Cuts};
+use self::{
+    cells::{Index, PatchCells},
+    composite::Composite,
+    cuts::Cuts,
+};
 use crate::{
+    fem,
     mesh::{CellShape, Mesh},
-    model::simplex::{Cells, as_box},
-    tensor::Vector,
+    model::simplex::{Cells, Simplex, as_box},
+    tensor::{Tensor, Vector},
 };
 
 /// Reasons for which a patch cannot be embedded.
@@ -50,15 +57,13 @@ pub enum PatchError {
         /// Edge of the cells \[m\].
         edge: f64,
     },
-    /// A cell of the rim lies in the body in part.
+    /// Nodes at the rim follow one another.
     #[error(
-        "the surface of the body cuts the rim of the zone at {position:?}: {percent:.1} % of a lattice cell lies within; keep the zone two spacings and a cell away from the surface, or let a plane of the lattice's cells be that surface (peridynamics.points.lattice.origin)"
+        "nodes of the rim of the zone follow one another near {position:?}; move the zone, or take a smaller spacing"
     )]
-    Surface {
-        /// Middle of the cell \[m\].
+    Circle {
+        /// Position of one of them \[m\].
         position: Vec<f64>,
-        /// Part of its volume in the body.
-        percent: f64,
     },
     /// The outer face of the rim cuts a cell of a kind that it may not.
     #[error(
@@ -80,13 +85,11 @@ pub enum PatchError {
         /// Middle of the cell of the lattice \[m\].
         position: Vec<f64>,
     },
-    /// No element near a node of the mesh is left.
+    /// No element near a node is left.
     #[error(
-        "node {node} at {position:?} keeps no element of which enough is left beside the rim of the zone; refine the mesh there, or move the zone"
+        "a node at {position:?} keeps no element of which enough is left beside the rim of the zone; refine the mesh there, or move the zone"
     )]
     Alone {
-        /// Number of the node.
-        node: u32,
         /// Its position \[m\].
         position: Vec<f64>,
     },
@@ -163,41 +166,113 @@ pub fn embed<const D: usize>(
     let patch = PatchCells::new(mesh, cells, width, is_wanted)?;
     patch.check_materials(material)?;
     let cuts = Cuts::new(mesh, &patch)?;
-    let followed = followers::followers(mesh, &cuts, is_held)?;
-    let rows = tie::rows(mesh, &patch, &cuts)?;
+    let mut rows = followers::of_mesh(mesh, &cuts, is_held)?;
+    rows.extend(followers::of_rim(&patch)?);
+    let tied = tie::rows(mesh, &patch, &cuts).into_iter();
+    rows.extend(tied.map(|(node, row)| (Place::Patch(node), row)));
     let composite = Composite::new(mesh, &patch, &cuts);
-    let patched = composite.with_followers(&followed, &rows);
-    check_masses(&patched.mesh)?;
+    let patched = composite.with_followers(&followers::resolved(&rows, &patch)?);
+    check_masses(&patched)?;
     Ok(patched)
 }
 
-/// Weights of nodes of the mesh.
-type NodeRow = Vec<(u32, f64)>;
+/// Size, first and second moment of a part of a cell or a facet.
+#[derive(Clone, Copy, Debug)]
+struct PartMoments<const D: usize> {
+    size: f64,
+    about: Vector<D>,
+    first: Vector<D>,
+    second: Tensor<D>,
+}
+
+impl<const D: usize> PartMoments<D> {
+    /// Nothing, with moments about a place.
+    fn about(place: Vector<D>) -> Self {
+        Self {
+            size: 0.0,
+            about: place,
+            first: Vector::zeros(),
+            second: Tensor::zeros(),
+        }
+    }
+
+    fn add(&mut self, part: &Simplex<D>) {
+        part.quadrature(|x, w| {
+            let x = x - self.about;
+            self.size += w;
+            self.first += x * w;
+            self.second += x * x.transpose() * w;
+        });
+    }
+
+    /// Adds another part, with moments about the same place.
+    fn join(&mut self, other: &Self) {
+        self.size += other.size;
+        self.first += other.first;
+        self.second += other.second;
+    }
+
+    /// Size, centroid, and the second moment about it over the size.
+    fn central(&self) -> (f64, Vector<D>, Tensor<D>) {
+        let centroid = self.first / self.size;
+        let second = self.second / self.size - centroid * centroid.transpose();
+        (self.size, self.about + centroid, second)
+    }
+
+    /// Places and weights that integrate polynomials of degree two over the part.
+    fn rule(&self) -> Vec<(Vector<D>, f64)> {
+        let (size, centroid, second) = self.central();
+        let places = fem::places_of_part(centroid, &second);
+        let weight = size / places.len() as f64;
+        places.into_iter().map(|x| (x, weight)).collect()
+    }
+}
+
+/// A node, of the mesh or of the patch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+enum Place<const D: usize> {
+    Mesh(u32),
+    Patch(Index<D>),
+}
+
+/// Weights of nodes.
+type Row<const D: usize> = Vec<(Place<D>, f64)>;
+
+/// The row of each node that follows others.
+type Rows<const D: usize> = BTreeMap<Place<D>, Row<D>>;
+
+/// Weights, over the largest of their row, that rounding leaves.
+const ROUNDING: f64 = 1e-15;
 
 /// Adds up the weights of each node.
-fn gathered(row: impl IntoIterator<Item = (u32, f64)>) -> NodeRow {
-    let mut sums: FxHashMap<u32, f64> = FxHashMap::default();
+fn gathered<const D: usize>(row: impl IntoIterator<Item = (Place<D>, f64)>) -> Row<D> {
+    let mut sums: FxHashMap<Place<D>, f64> = FxHashMap::default();
     for (n, w) in row {
         *sums.entry(n).or_insert(0.0) += w;
     }
-    let mut row: NodeRow = sums.into_iter().filter(|e| e.1.abs() > 1e-14).collect();
+    let largest = sums.values().fold(0.0, |most: f64, w| most.max(w.abs()));
+    let own = sums.into_iter();
+    let mut row: Row<D> = own.filter(|e| e.1.abs() > ROUNDING * largest).collect();
     row.sort_unstable_by_key(|e| e.0);
     row
 }
 
-/// Refuses a mesh of which a node that follows none has no positive volume.
-fn check_masses<const D: usize>(mesh: &Mesh<D>) -> Result<(), PatchError> {
-    let mut volume = crate::fem::nodal_volumes(mesh, 0..mesh.cell_count());
+/// Refuses a mesh of which a node of elements that follows none has no positive volume.
+fn check_masses<const D: usize>(patched: &Patched<D>) -> Result<(), PatchError> {
+    let mesh = &patched.mesh;
+    let elements = || (0..mesh.cell_count()).filter(|&c| !patched.nonlocal[c]);
+    let mut volume = fem::nodal_volumes(mesh, elements());
     for (&n, row) in &mesh.embedded.followers {
         let own = std::mem::take(&mut volume[n as usize]);
         row.iter().for_each(|&(m, w)| volume[m as usize] += w * own);
     }
-    let follows = |n: usize| mesh.embedded.followers.contains_key(&(n as u32));
-    match (0..volume.len()).find(|&n| volume[n] <= 0.0 && !follows(n)) {
+    let follows = |n: &u32| mesh.embedded.followers.contains_key(n);
+    let mut nodes = elements().flat_map(|c| mesh.cell(c));
+    match nodes.find(|n| volume[**n as usize] <= 0.0 && !follows(n)) {
         None => Ok(()),
-        Some(n) => Err(PatchError::Mass {
-            position: mesh.nodes[n].iter().copied().collect(),
-            volume: volume[n],
+        Some(&n) => Err(PatchError::Mass {
+            position: mesh.nodes[n as usize].iter().copied().collect(),
+            volume: volume[n as usize],
         }),
     }
 }

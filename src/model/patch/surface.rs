@@ -1,20 +1,25 @@
-//! Facets at the surface of the body of which a patch covers a part: the patch has faces there, on the same planes.
+//! Facets at the surface of the body that a patch covers, divided among its cells.
+//!
+//! Where a facet lies in a plane between lattice cells, the patch has faces of its own there. Elsewhere the parts of the facet are the surface of the cells that they cross.
 
 use std::collections::BTreeMap;
 
 use super::{
-    cells::{Face, PatchCells},
+    PartMoments,
+    cells::{Face, Index, PatchCells},
     cuts::Cuts,
 };
 use crate::{
-    fem,
     mesh::{Mesh, boundary::BoundaryFacet, facet_corners},
     model::simplex::{Simplex, facet_simplices},
-    tensor::{Tensor, Vector},
+    tensor::Vector,
 };
 
-/// Distance into the body, in edges of a cell, at which facets are divided among cells: on the surface itself they lie between two.
+/// Distance into the body, in edges of a cell, at which facets are divided among cells: on the surface itself they may lie between two.
 const INWARDS: f64 = 1e-3;
+
+/// Distance from a plane between cells within which a facet lies in it, in edges.
+const IN_PLANE: f64 = 1e-7;
 
 /// Part of a facet below which it is nothing.
 const NOTHING: f64 = 1e-9;
@@ -23,76 +28,94 @@ const NOTHING: f64 = 1e-9;
 pub(super) struct MetFacet<const D: usize> {
     /// Faces of the patch on it, with the size that they have in common.
     pub faces: Vec<(Face<D>, f64)>,
-    /// Places and weights that integrate over what is left; empty if nothing is.
-    pub left: Vec<(Vector<D>, f64)>,
+    /// What is left of it.
+    pub left: PartMoments<D>,
+    /// True if nothing is left of it.
+    pub is_gone: bool,
 }
 
-/// The facets at the surface of which the patch covers a part, by their sorted corners.
-pub(super) fn met_facets<const D: usize>(
-    mesh: &Mesh<D>,
-    patch: &PatchCells<D>,
-    cuts: &Cuts,
-) -> BTreeMap<Vec<u32>, MetFacet<D>> {
-    let mut met = BTreeMap::new();
-    for facet in mesh.outer_facets() {
-        if !cuts.is_met(facet.cell) {
-            continue;
-        }
-        let found = divided(mesh, patch, &facet);
-        if !found.faces.is_empty() {
-            let mut corners = facet_corners::<D>(&facet.nodes).to_vec();
-            corners.sort_unstable();
-            met.insert(corners, found);
-        }
-    }
-    met
+/// The surface of a patch.
+pub(super) struct PatchSurface<const D: usize> {
+    /// The facets of which it covers a part, by their sorted corners.
+    pub met: BTreeMap<Vec<u32>, MetFacet<D>>,
+    /// Faces of cells at the surface of the body, with the part of each that is surface.
+    pub faces: BTreeMap<Face<D>, PartMoments<D>>,
+    /// Parts of other facets, each with its cell and the outward normal.
+    pub parts: Vec<(Index<D>, Simplex<D>, Vector<D>)>,
 }
 
-fn divided<const D: usize>(
-    mesh: &Mesh<D>,
-    patch: &PatchCells<D>,
-    facet: &BoundaryFacet,
-) -> MetFacet<D> {
-    let normal = mesh.facet_normal_area(facet).normalize();
-    let axis = (0..D).max_by(|&a, &b| normal[a].abs().total_cmp(&normal[b].abs()));
-    let axis = axis.unwrap_or(0);
-    let inwards = normal * (-INWARDS * patch.cells.spacing);
-    let about = mesh.nodes[facet.nodes[0] as usize];
-    let mut faces: BTreeMap<Face<D>, f64> = BTreeMap::new();
-    let (mut size, mut first, mut second) = (0.0, Vector::<D>::zeros(), Tensor::<D>::zeros());
-    let mut whole = 0.0;
-    for simplex in facet_simplices(mesh, &facet.nodes) {
-        let moved: Simplex<D> = simplex.shifted(&inwards);
-        patch.cells.dice(&moved, &|_, _| true, &mut |index, part| {
-            whole += part.size();
-            if patch.all.contains(&index) {
-                let face = Face {
-                    cell: index,
-                    axis,
-                    is_upper: normal[axis] > 0.0,
-                };
-                *faces.entry(face).or_insert(0.0) += part.size();
-                return;
+impl<const D: usize> PatchSurface<D> {
+    pub fn new(mesh: &Mesh<D>, patch: &PatchCells<D>, cuts: &Cuts) -> Self {
+        let mut surface = Self {
+            met: BTreeMap::new(),
+            faces: BTreeMap::new(),
+            parts: Vec::new(),
+        };
+        for facet in mesh.outer_facets() {
+            if cuts.is_met(facet.cell) {
+                surface.divide(mesh, patch, &facet);
             }
-            part.quadrature(|x, w| {
-                let x = x - inwards - about;
-                size += w;
-                first += x * w;
-                second += x * x.transpose() * w;
-            });
-        });
+        }
+        surface
     }
-    faces.retain(|_, size| *size > NOTHING * whole);
-    let mut left = Vec::new();
-    if size > NOTHING * whole {
-        let centroid = first / size;
-        let second = second / size - centroid * centroid.transpose();
-        let places = fem::places_of_part(about + centroid, &second);
-        let weight = size / places.len() as f64;
-        left.extend(places.into_iter().map(|x| (x, weight)));
-    }
-    MetFacet {
-        faces: faces.into_iter().collect(),
-        left,
+
+    fn divide(&mut self, mesh: &Mesh<D>, patch: &PatchCells<D>, facet: &BoundaryFacet) {
+        let normal = mesh.facet_normal_area(facet).normalize();
+        let edge = patch.cells.spacing;
+        let axis = (0..D).max_by(|&a, &b| normal[a].abs().total_cmp(&normal[b].abs()));
+        let axis = axis.unwrap_or(0);
+        let in_plane = |&n: &u32| {
+            let at = (mesh.nodes[n as usize] - patch.node(&[0; D]))[axis] / edge;
+            (at - at.round()).abs() < IN_PLANE
+        };
+        let is_face = facet.nodes.iter().all(in_plane) && normal[axis].abs() > 1.0 - 1e-9;
+        let inwards = normal * (-INWARDS * edge);
+        let mut left = PartMoments::about(mesh.nodes[facet.nodes[0] as usize]);
+        let mut faces: BTreeMap<Face<D>, PartMoments<D>> = BTreeMap::new();
+        let (mut whole, mut is_met) = (0.0, false);
+        for simplex in facet_simplices(mesh, &facet.nodes) {
+            patch.cells.dice(
+                &simplex.shifted(&inwards),
+                &|_, _| true,
+                &mut |index, part| {
+                    let part = part.shifted(&-inwards);
+                    whole += part.size();
+                    if !patch.all.contains(&index) {
+                        left.add(&part);
+                        return;
+                    }
+                    is_met = true;
+                    if !is_face {
+                        self.parts.push((index, part, normal));
+                        return;
+                    }
+                    let face = Face {
+                        cell: index,
+                        axis,
+                        is_upper: normal[axis] > 0.0,
+                    };
+                    let about = || PartMoments::about(patch.cells.centre(&index));
+                    faces.entry(face).or_insert_with(about).add(&part);
+                },
+            );
+        }
+        if !is_met {
+            return;
+        }
+        faces.retain(|_, part| part.size > NOTHING * whole);
+        for (face, part) in &faces {
+            let about = || PartMoments::about(patch.cells.centre(&face.cell));
+            self.faces.entry(*face).or_insert_with(about).join(part);
+        }
+        let mut corners = facet_corners::<D>(&facet.nodes).to_vec();
+        corners.sort_unstable();
+        let found = MetFacet {
+            faces: (faces.into_iter())
+                .map(|(face, part)| (face, part.size))
+                .collect(),
+            is_gone: left.size <= NOTHING * whole,
+            left,
+        };
+        self.met.insert(corners, found);
     }
 }

@@ -2,14 +2,14 @@
 //!
 //! `Σ_j D_ij u_j = Σ_a M_ia u_a` with `D_ij = ∫_Γ ψ_i φ_j` and `M_ia = ∫_Γ ψ_i N_a`: φ the shape functions of the rim on Γ, N those of the mesh beyond it, ψ_i the dual function of node i on the
 //! plane part of Γ that the node belongs to. On each face ψ = A φ for the nodes that belong to its part, `∫ ψ_i φ_j = δ_ij ∫ φ_j` among them and `Σ ψ_i = 1`, of the least norm. Nodes of a face that belong to
-//! another part come from parts of lower axes, so that rows are solved in the order of axes.
+//! another part, and those that follow the rim where the surface of the body leaves too little of its elements, stay in the equation. Where that surface cuts the face, integrals are over what has elements beyond it.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
 use super::{
-    NodeRow, PatchError,
+    Place, Row,
     cells::{Face, Index, PatchCells},
     cuts::Cuts,
     gathered,
@@ -25,116 +25,127 @@ use crate::{
 /// Distance beyond Γ at which the mesh is cut by a plane, in edges of a cell: facets of the mesh in Γ itself then belong to the cells beyond.
 const BEYOND: f64 = 1e-7;
 
-/// Part of a face that may be without an element beyond it, by rounding.
-const UNCOVERED: f64 = 1e-6;
+/// Part of a face below which it has no element beyond it, and above which less one it has everywhere, by rounding.
+const COVERED: f64 = 1e-6;
 
-/// Integrals over one face.
-struct FaceRows<const D: usize> {
-    /// Row of each node that belongs to the face's part: the node, `∫ ψ_i φ_i`, `∫ ψ_i φ_j` of the others, `∫ ψ_i N_a`.
-    rows: Vec<(Index<D>, f64, Vec<(Index<D>, f64)>, NodeRow)>,
+/// A face with the mesh beyond it.
+struct TiedFace<const D: usize> {
+    face: Face<D>,
+    /// Parts of the face, each with its cell of the mesh.
+    parts: Vec<(u32, Simplex<D>)>,
+    /// True if elements lie beyond all of it.
+    is_whole: bool,
 }
 
-/// The row of each node of Γ: nodes of the mesh with their weights.
-///
-/// # Errors
-/// [`PatchError::Surface`] where the surface of the body meets a face within it.
+/// Rows of nodes of Γ: the face's node, `∫ ψ_i φ_i`, and the other terms of its equation, `∫ ψ_i φ_j` with the opposite sign and `∫ ψ_i N_a`.
+type FaceRows<const D: usize> = Vec<(Index<D>, f64, Row<D>)>;
+
+/// The row of each node of Γ that follows the mesh by the mortar: in nodes of the mesh and of the patch, others of Γ among them.
 pub(super) fn rows<const D: usize>(
     mesh: &Mesh<D>,
     patch: &PatchCells<D>,
     cuts: &Cuts,
-) -> Result<BTreeMap<Index<D>, NodeRow>, PatchError> {
-    let faces = patch.faces();
+) -> BTreeMap<Index<D>, Row<D>> {
+    let all = patch.faces();
+    let tied = parallel::map(all.len(), 4, |f| tied_face(mesh, patch, cuts, &all[f]));
+    let tied: Vec<TiedFace<D>> = tied.into_iter().flatten().collect();
+    let faces: Vec<Face<D>> = tied.iter().map(|tied| tied.face).collect();
     let axes = PatchCells::axes(&faces);
-    let dual = Dual::<D>::new();
-    let found = parallel::map(faces.len(), 4, |f| {
-        face_rows(mesh, patch, cuts, &faces[f], &axes, &dual)
+    let mass = mass_of_face::<D>();
+    let found = parallel::map(tied.len(), 4, |f| {
+        face_rows(mesh, patch, &tied[f], &axes, &mass)
     });
-    let mut sums: BTreeMap<(usize, Index<D>), (f64, Vec<(Index<D>, f64)>, NodeRow)> =
-        BTreeMap::new();
-    for (face, own) in faces.iter().zip(found) {
-        for (node, diagonal, others, row) in own?.rows {
-            let sum = sums.entry((face.axis, node)).or_default();
-            sum.0 += diagonal;
-            sum.1.extend(others);
-            sum.2.extend(row);
-        }
+    let mut sums: BTreeMap<Index<D>, (f64, Row<D>)> = BTreeMap::new();
+    for (node, diagonal, row) in found.into_iter().flatten() {
+        let sum = sums.entry(node).or_default();
+        sum.0 += diagonal;
+        sum.1.extend(row);
     }
-    // by axis, so that what a row takes of another part is there
-    let mut rows: BTreeMap<Index<D>, NodeRow> = BTreeMap::new();
-    for ((_, node), (diagonal, others, own)) in sums {
-        let others = others.into_iter().flat_map(|(other, d)| {
-            let row = rows.get(&other).into_iter().flatten();
-            row.map(move |&(n, w)| (n, -w * d))
-        });
-        let row = gathered(own.into_iter().chain(others));
-        rows.insert(
-            node,
-            row.into_iter().map(|(n, w)| (n, w / diagonal)).collect(),
-        );
-    }
-    Ok(rows)
+    (sums.into_iter())
+        .map(|(node, (diagonal, row))| {
+            let row = gathered(row).into_iter();
+            (node, row.map(|(n, w)| (n, w / diagonal)).collect())
+        })
+        .collect()
+}
+
+/// A face with the parts of the mesh beyond it; none where there are none.
+fn tied_face<const D: usize>(
+    mesh: &Mesh<D>,
+    patch: &PatchCells<D>,
+    cuts: &Cuts,
+    face: &Face<D>,
+) -> Option<TiedFace<D>> {
+    let size = patch.cells.spacing.powi(D as i32 - 1);
+    let beyond = patch.held[&face.neighbour()].iter();
+    let parts: Vec<(u32, Simplex<D>)> = beyond
+        .filter(|(c, _)| !cuts.is_covered(*c))
+        .flat_map(|&(c, _)| {
+            let parts = sections(mesh, patch, face, c as usize).into_iter();
+            parts.map(move |part| (c, part))
+        })
+        .collect();
+    let covered = parts.iter().map(|part| part.1.size()).sum::<f64>() / size;
+    (covered > COVERED).then_some(TiedFace {
+        face: *face,
+        parts,
+        is_whole: covered > 1.0 - COVERED,
+    })
 }
 
 fn face_rows<const D: usize>(
     mesh: &Mesh<D>,
     patch: &PatchCells<D>,
-    cuts: &Cuts,
-    face: &Face<D>,
+    TiedFace {
+        face,
+        parts,
+        is_whole,
+    }: &TiedFace<D>,
     axes: &BTreeMap<Index<D>, usize>,
-    dual: &Dual<D>,
-) -> Result<FaceRows<D>, PatchError> {
+    mass_of_whole: &DMatrix<f64>,
+) -> FaceRows<D> {
     let nodes = face.nodes();
-    let keep = nodes.iter().map(|node| axes[node] == face.axis);
-    let (kept, psi) = dual.functions(keep.collect());
+    let kept: Vec<usize> = (0..nodes.len())
+        .filter(|&i| axes[&nodes[i]] == face.axis && !patch.is_bad(&nodes[i]))
+        .collect();
     let edge = patch.cells.spacing;
-    let size = edge.powi(D as i32 - 1);
     let corner = patch.node(&nodes[0]);
-    let mut of_mesh: Vec<NodeRow> = vec![Vec::new(); kept.len()];
-    let mut covered = 0.0;
-    let beyond = face.neighbour();
-    for &(c, _) in &patch.held[&beyond] {
-        if cuts.is_covered(c) {
-            continue;
-        }
-        for part in sections(mesh, patch, face, c as usize) {
+    let phi = |x: &Vector<D>| shape_on_face(&((x - corner) / edge), face.axis);
+    let mut mass = mass_of_whole * edge.powi(D as i32 - 1);
+    if !is_whole {
+        mass.fill(0.0);
+        for (_, part) in parts {
             part.quadrature(|x, w| {
-                covered += w;
-                let Some(xi) = fem::reference_of(mesh, c as usize, &x) else {
-                    return;
-                };
-                let (shape, _) = fem::shape_values(mesh, c as usize, &xi);
-                let phi = shape_on_face(&((x - corner) / edge), face.axis);
-                for (row, psi) in of_mesh.iter_mut().zip(psi.row_iter()) {
-                    let value: f64 = psi.iter().zip(&phi).map(|(a, phi)| a * phi).sum();
-                    let cell = mesh.cell(c as usize).iter().zip(&shape);
-                    row.extend(cell.map(|(&n, shape)| (n, value * w * shape)));
-                }
+                let phi = DVector::from_vec(phi(&x));
+                mass.ger(w, &phi, &phi, 1.0);
             });
         }
     }
-    if (covered / size - 1.0).abs() > UNCOVERED {
-        return Err(PatchError::Surface {
-            position: patch.cells.centre(&beyond).iter().copied().collect(),
-            percent: 100.0 * covered / size,
+    let psi = dual_functions(&kept, &mass);
+    let mut rows: Vec<Row<D>> = vec![Vec::new(); kept.len()];
+    for (c, part) in parts {
+        let c = *c as usize;
+        part.quadrature(|x, w| {
+            let Some(xi) = fem::reference_of(mesh, c, &x) else {
+                return;
+            };
+            let (shape, _) = fem::shape_values(mesh, c, &xi);
+            let phi = phi(&x);
+            for (row, psi) in rows.iter_mut().zip(psi.row_iter()) {
+                let value: f64 = psi.iter().zip(&phi).map(|(a, phi)| a * phi).sum();
+                let cell = mesh.cell(c).iter().zip(&shape);
+                row.extend(cell.map(|(&n, shape)| (Place::Mesh(n), value * w * shape)));
+            }
         });
     }
-    let moments = &psi * &dual.mass * size;
-    let rows = kept
-        .iter()
-        .zip(of_mesh)
-        .enumerate()
-        .map(|(k, (&own, row))| {
-            let others = (0..nodes.len()).filter(|j| !kept.contains(j));
-            (
-                nodes[own],
-                moments[(k, own)],
-                others.map(|j| (nodes[j], moments[(k, j)])).collect(),
-                gathered(row),
-            )
-        });
-    Ok(FaceRows {
-        rows: rows.collect(),
+    let moments = &psi * &mass;
+    let rows = kept.iter().zip(rows).enumerate();
+    rows.map(|(k, (&own, mut row))| {
+        let others = (0..nodes.len()).filter(|&j| j != own);
+        row.extend(others.map(|j| (Place::Patch(nodes[j]), -moments[(k, j)])));
+        (nodes[own], moments[(k, own)], gathered(row))
     })
+    .collect()
 }
 
 /// The parts of a face that a cell of the mesh has just beyond it.
@@ -184,52 +195,41 @@ fn shape_on_face<const D: usize>(s: &Vector<D>, axis: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Dual functions of a face of unit size.
-struct Dual<const D: usize> {
-    /// `∫ φ_i φ_j`.
-    mass: DMatrix<f64>,
+/// `∫ φ_i φ_j` of a face of unit size.
+fn mass_of_face<const D: usize>() -> DMatrix<f64> {
+    let count = 1usize << (D - 1);
+    let along = |bits: usize| match bits {
+        0 => 1.0 / 3.0,
+        _ => 1.0 / 6.0,
+    };
+    DMatrix::from_fn(count, count, |i, j| {
+        (0..D - 1).map(|k| along((i ^ j) >> k & 1)).product()
+    })
 }
 
-impl<const D: usize> Dual<D> {
-    fn new() -> Self {
-        let count = 1usize << (D - 1);
-        let along = |bits: usize| match bits {
-            0 => 1.0 / 3.0,
-            _ => 1.0 / 6.0,
-        };
-        let mass = DMatrix::from_fn(count, count, |i, j| {
-            (0..D - 1).map(|k| along((i ^ j) >> k & 1)).product()
-        });
-        Self { mass }
+/// Coefficients `A` of the functions `ψ = A φ` of the nodes that are kept, one row for each: biorthogonal to the shape functions of those, with the sum one, of the least norm.
+fn dual_functions(kept: &[usize], mass: &DMatrix<f64>) -> DMatrix<f64> {
+    let (n, count) = (kept.len(), mass.nrows());
+    let size = mass.sum();
+    let mut conditions = DMatrix::zeros(n * n + count, n * count);
+    let mut wanted = DVector::zeros(n * n + count);
+    for p in 0..n {
+        for q in 0..n {
+            for j in 0..count {
+                conditions[(p * n + q, p * count + j)] = mass[(j, kept[q])] / size;
+            }
+            if p == q {
+                wanted[p * n + q] = mass.column(kept[q]).sum() / size;
+            }
+        }
     }
-
-    /// The nodes that are kept, and the coefficients `A` of their functions `ψ = A φ`, one row for each.
-    fn functions(&self, keep: Vec<bool>) -> (Vec<usize>, DMatrix<f64>) {
-        let count = keep.len();
-        let kept: Vec<usize> = (0..count).filter(|&i| keep[i]).collect();
-        let n = kept.len();
-        // conditions on the entries of A, row by row: biorthogonal to those kept, and a sum of one
-        let mut conditions = DMatrix::zeros(n * n + count, n * count);
-        let mut wanted = DVector::zeros(n * n + count);
+    for j in 0..count {
         for p in 0..n {
-            for q in 0..n {
-                for j in 0..count {
-                    conditions[(p * n + q, p * count + j)] = self.mass[(j, kept[q])];
-                }
-                wanted[p * n + q] = if p == q { 1.0 / count as f64 } else { 0.0 };
-            }
+            conditions[(n * n + j, p * count + j)] = 1.0;
         }
-        for j in 0..count {
-            for p in 0..n {
-                conditions[(n * n + j, p * count + j)] = 1.0;
-            }
-            wanted[n * n + j] = 1.0;
-        }
-        let solved = conditions.svd(true, true).solve(&wanted, 1e-12);
-        let entries = solved.unwrap_or_else(|_| DVector::zeros(n * count));
-        (
-            kept,
-            DMatrix::from_fn(n, count, |p, j| entries[p * count + j]),
-        )
+        wanted[n * n + j] = 1.0;
     }
+    let solved = conditions.svd(true, true).solve(&wanted, 1e-13);
+    let entries = solved.unwrap_or_else(|_| DVector::zeros(n * count));
+    DMatrix::from_fn(n, count, |p, j| entries[p * count + j])
 }

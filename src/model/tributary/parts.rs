@@ -55,6 +55,10 @@ fn marked<const D: usize>(
         let (low, high) = mesh.bounds_of(&facet.nodes);
         marks.mark(&low, &high);
     }
+    for &c in mesh.embedded.pieces.keys().filter(|&&c| mine[c as usize]) {
+        let (low, high) = mesh.bounds_of(mesh.cell(c as usize));
+        marks.mark(&low, &high);
+    }
     marks.mark_voids(voids);
     (marks, [low, high])
 }

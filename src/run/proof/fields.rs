@@ -2,7 +2,7 @@
 
 use crate::fem;
 use crate::mesh::boundary::BoundaryFacet;
-use crate::mesh::{Mesh, facet_corners};
+use crate::mesh::{Embedded, Mesh, facet_corners};
 use crate::model::Model;
 use crate::tensor::{Tensor, Tensor4, Vector};
 
@@ -52,7 +52,11 @@ pub(super) fn boundary_integrals<const D: usize>(model: &Model<D>) -> Vec<(u32, 
     let mesh = &model.mesh;
     let mut list = Vec::new();
     let mut add = |facet: &BoundaryFacet| {
-        for (n, share) in facet.nodes.iter().zip(shares(mesh, facet)) {
+        let nodes = match facet.local == Embedded::<D>::CROSSING {
+            true => mesh.cell(facet.cell as usize),
+            false => &facet.nodes,
+        };
+        for (n, share) in nodes.iter().zip(shares(mesh, facet)) {
             match model.followed_nodes(*n) {
                 Some(followed) => {
                     let all = followed.iter();
@@ -85,6 +89,9 @@ pub(super) fn boundary_integrals<const D: usize>(model: &Model<D>) -> Vec<(u32, 
 
 /// `∫ N_a n dA` of each node of a facet.
 fn shares<const D: usize>(mesh: &Mesh<D>, facet: &BoundaryFacet) -> Vec<Vector<D>> {
+    if facet.local == Embedded::<D>::CROSSING {
+        return shares_of_cell(mesh, facet);
+    }
     let count = facet.nodes.len();
     let corners = facet_corners::<D>(&facet.nodes);
     if corners.len() < count || mesh.embedded.cut_facet(corners).is_some() {
@@ -114,6 +121,22 @@ fn shares<const D: usize>(mesh: &Mesh<D>, facet: &BoundaryFacet) -> Vec<Vector<D
             *sum += normal * (0.25 * (1.0 + a * s) * (1.0 + b * t));
         }
     }
+    sums
+}
+
+/// `∫ N_a n dA` of each node of a cell over a facet that crosses it.
+fn shares_of_cell<const D: usize>(mesh: &Mesh<D>, facet: &BoundaryFacet) -> Vec<Vector<D>> {
+    let cell = facet.cell as usize;
+    let mut sums = vec![Vector::zeros(); mesh.cell(cell).len()];
+    fem::outward_points(mesh, facet, |p| {
+        let Some(xi) = fem::reference_of(mesh, cell, &p.position) else {
+            return;
+        };
+        let (shape, _) = fem::shape_values(mesh, cell, &xi);
+        for (sum, value) in sums.iter_mut().zip(shape) {
+            *sum += p.normal * (value * p.weight);
+        }
+    });
     sums
 }
 
