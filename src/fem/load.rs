@@ -1,7 +1,8 @@
 //! Consistent nodal forces of tractions and body forces.
 
 use super::cell::{ReferenceCell, Rule, RulePoint};
-use super::element::for_each_point;
+use super::element::{for_each_point, shape_values};
+use super::locate::reference_of;
 use super::{line2, line3, quad4, quad8, tri3, tri6};
 use crate::mesh::boundary::BoundaryFacet;
 use crate::mesh::{Mesh, facet_corners};
@@ -200,14 +201,40 @@ pub fn traction_vector<const D: usize>(
     facet: &[u32],
     traction: impl Fn(&Vector<D>) -> Vector<D>,
 ) -> Vec<(u32, Vector<D>)> {
-    let mut forces: Vec<(u32, Vector<D>)> = facet.iter().map(|&n| (n, Vector::zeros())).collect();
-    facet_points(mesh, facet, |p| {
-        let t = traction(&p.position) * p.weight;
-        for ((_, f), n) in forces.iter_mut().zip(&p.shape) {
+    let mut spread = Spread::new(mesh, facet);
+    facet_points(mesh, facet, |p| spread.add(p, traction(&p.position)));
+    spread.forces
+}
+
+/// Nodal forces of a facet: of its own nodes, or of those of the cell that the surface crosses there.
+struct Spread<'a, const D: usize> {
+    mesh: &'a Mesh<D>,
+    crossed: Option<usize>,
+    forces: Vec<(u32, Vector<D>)>,
+}
+
+impl<'a, const D: usize> Spread<'a, D> {
+    fn new(mesh: &'a Mesh<D>, facet: &[u32]) -> Self {
+        let crossed = mesh.embedded.crossing(facet).map(|f| f.cell as usize);
+        let nodes = crossed.map_or(facet, |c| mesh.cell(c)).iter();
+        Self {
+            mesh,
+            crossed,
+            forces: nodes.map(|&n| (n, Vector::zeros())).collect(),
+        }
+    }
+
+    fn add(&mut self, p: &FacetPoint<D>, traction: Vector<D>) {
+        let t = traction * p.weight;
+        let of_cell = self.crossed.map(|c| {
+            let xi = reference_of(self.mesh, c, &p.position);
+            shape_values(self.mesh, c, &xi.unwrap_or_else(Vector::zeros)).0
+        });
+        let shape = of_cell.as_ref().map_or(&p.shape[..], |shape| &shape[..]);
+        for ((_, f), n) in self.forces.iter_mut().zip(shape) {
             *f += t * *n;
         }
-    });
-    forces
+    }
 }
 
 /// Consistent nodal forces `f_a = ∫ N_a t(x, n) dA` of a traction that knows the outward unit normal n: one (node, force) per node of the facet.
@@ -218,15 +245,11 @@ pub fn outward_traction_vector<const D: usize>(
     facet: &BoundaryFacet,
     traction: impl Fn(&Vector<D>, &Vector<D>) -> Vector<D>,
 ) -> Vec<(u32, Vector<D>)> {
-    let nodes = facet.nodes.iter();
-    let mut forces: Vec<(u32, Vector<D>)> = nodes.map(|&n| (n, Vector::zeros())).collect();
+    let mut spread = Spread::new(mesh, &facet.nodes);
     outward_points(mesh, facet, |p| {
-        let t = traction(&p.position, &p.normal) * p.weight;
-        for ((_, f), n) in forces.iter_mut().zip(&p.shape) {
-            *f += t * *n;
-        }
+        spread.add(p, traction(&p.position, &p.normal));
     });
-    forces
+    spread.forces
 }
 
 /// Consistent nodal forces `f_a = ∫ N_a b dV` of a body force in cell `c`: one (node, force) per node of the cell.

@@ -3,7 +3,7 @@
 use rustc_hash::FxHashMap;
 
 use super::error::position;
-use super::{Facet, Mesh, MeshError, facet_corners};
+use super::{Embedded, Facet, Mesh, MeshError, facet_corners};
 use crate::tensor::Vector;
 
 /// A facet seen from one of its cells.
@@ -93,6 +93,14 @@ impl<const D: usize> Mesh<D> {
         }
     }
 
+    /// A facet with the nodes that its cell has in this mesh: cells may have been made linear since.
+    pub fn present_facet(&self, facet: &BoundaryFacet) -> BoundaryFacet {
+        match facet.local == Embedded::<D>::CROSSING {
+            true => facet.clone(),
+            false => self.facet((facet.cell, facet.local)),
+        }
+    }
+
     /// The facets of a cell by their numbers, with their keys.
     pub(super) fn keys_of_cell(&self, c: u32) -> impl Iterator<Item = ((u32, u8), [u32; 4])> + '_ {
         let nodes = self.cell(c as usize);
@@ -125,7 +133,7 @@ impl<const D: usize> Mesh<D> {
         let mut facets = self.boundary_facets(0..self.cell_count() as u32);
         if !self.embedded.inner.is_empty() {
             facets.retain(|facet| !self.embedded.inner.contains(&facet.key::<D>()));
-            facets.extend_from_slice(&self.embedded.surface);
+            facets.extend(self.embedded.surface.values().cloned());
         }
         facets
     }
@@ -242,8 +250,9 @@ impl<const D: usize> Mesh<D> {
         facets
             .iter()
             .map(|f| {
-                wanted[&key(facet_corners::<D>(f).iter().copied())]
-                    .clone()
+                let found = wanted[&key(facet_corners::<D>(f).iter().copied())].clone();
+                found
+                    .or_else(|| self.embedded.crossing(f).cloned())
                     .ok_or_else(|| self.loose(f))
             })
             .collect()

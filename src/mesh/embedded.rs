@@ -38,8 +38,8 @@ pub struct Embedded<const D: usize> {
     pub(super) cut_facets: FxHashMap<[u32; 4], Vec<(Vector<D>, f64)>>,
     /// The part of each cell of the patch that the surface of the body cuts, as simplices; corners beyond `D + 1` have no meaning.
     pub pieces: FxHashMap<u32, Vec<[Vector<D>; 4]>>,
-    /// The surface of the body in cells that it crosses: its nodes belong to no cell.
-    pub(super) surface: Vec<BoundaryFacet>,
+    /// The surface of the body in cells that it crosses, by sorted nodes: these belong to no cell.
+    pub(super) surface: BTreeMap<[u32; 4], BoundaryFacet>,
     /// The place of the patch.
     pub covered: Covered<D>,
 }
@@ -63,7 +63,7 @@ impl<const D: usize> Default for Embedded<D> {
             inner: FxHashSet::default(),
             cut_facets: FxHashMap::default(),
             pieces: FxHashMap::default(),
-            surface: Vec::new(),
+            surface: BTreeMap::new(),
             covered: Covered {
                 corner: Vector::zeros(),
                 edge: 1.0,
@@ -101,11 +101,20 @@ impl<const D: usize> Embedded<D> {
 
     /// Adds a facet to the surface of the body in a cell that it crosses; its nodes, of which the normal points outwards, belong to no cell.
     pub fn add_surface(&mut self, cell: u32, nodes: Facet) {
-        self.surface.push(BoundaryFacet {
-            nodes,
-            cell,
-            local: Self::CROSSING,
-        });
+        let key = super::boundary::key(nodes.iter().copied());
+        let local = Self::CROSSING;
+        self.surface
+            .insert(key, BoundaryFacet { nodes, cell, local });
+    }
+
+    /// The facet of the surface with these nodes, where the surface crosses a cell.
+    pub fn crossing(&self, nodes: &[u32]) -> Option<&BoundaryFacet> {
+        match self.surface.is_empty() || nodes.len() > 4 {
+            true => None,
+            false => self
+                .surface
+                .get(&super::boundary::key(nodes.iter().copied())),
+        }
     }
 
     /// Number of a facet within its cell that stands for the surface that crosses the cell.

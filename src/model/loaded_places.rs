@@ -7,6 +7,9 @@ use crate::model::Model;
 /// Returns true if any of the facets may belong to a cell that holds points: all of its nodes do. To find the cells themselves takes all facets of the mesh.
 pub(crate) fn may_bound_zone<const D: usize>(model: &Model<D>, facets: &[Facet]) -> bool {
     let at_zone = |facet: &Facet| {
+        if let Some(crossing) = model.mesh.embedded.crossing(facet) {
+            return !model.is_element(crossing.cell as usize);
+        }
         let corners = facet_corners::<D>(facet);
         corners.iter().all(|&n| model.touches_points(n))
     };

@@ -66,8 +66,14 @@ impl Ties {
         for (&node, followed) in &mesh.embedded.followers {
             ties.add(node, followed.clone());
         }
+        let followed = &mesh.embedded.followers;
+        let through = |(n, w): (u32, f64)| match followed.get(&n) {
+            Some(others) => others.iter().map(|&(other, v)| (other, v * w)).collect(),
+            None => vec![(n, w)],
+        };
         for tie in mesh.ties() {
-            ties.add(tie.node, tie.ends.map(|end| (end, 0.5)).to_vec());
+            let ends = tie.ends.map(|end| (end, 0.5)).into_iter();
+            ties.add(tie.node, ends.flat_map(through).collect());
         }
         ties
     }

@@ -290,7 +290,7 @@ impl<'a, const D: usize> Loads<'a, D> {
                 }
                 Domain::Surface(facets) => {
                     // with the nodes that its cell has in the model: cells at the seam are linear
-                    let present = facets.iter().map(|f| model.mesh.facet((f.cell, f.local)));
+                    let present = facets.iter().map(|f| model.mesh.present_facet(f));
                     let (own, zone): (Vec<_>, Vec<_>) =
                         present.partition(|f| model.is_element(f.cell as usize));
                     pressed = own;

@@ -79,10 +79,14 @@ pub(super) fn scene<const D: usize>(
     }
     let choice = Decision {
         choice: format!(
-            "a rim of {} elements of edge {} around the zone; {} elements of the mesh end at it",
+            "a rim of {} elements of edge {} around the zone; {} elements of the mesh end at it{}",
             patched.rim,
             number(spacing * f64::from(per_cell)),
-            patched.mesh.embedded.cut.len()
+            patched.mesh.embedded.cut.len() - patched.mesh.embedded.pieces.len(),
+            match patched.linear {
+                0 => String::new(),
+                n => format!(", {n} of second order are linear there"),
+            }
         ),
         why: "the scene asks for a rim of its own".to_owned(),
     };

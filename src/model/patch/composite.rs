@@ -90,6 +90,7 @@ impl<const D: usize> Composite<D> {
         let mut composite = Self {
             patched: Patched {
                 rim: patch.all.len() - patch.zone.len(),
+                linear: 0,
                 mesh,
                 nonlocal,
                 origin,
@@ -101,9 +102,9 @@ impl<const D: usize> Composite<D> {
         };
         let surface = PatchSurface::new(before, patch, cuts);
         composite.hide_facets(before, patch, &surface, &left);
-        composite.add_surface(patch, &surface);
+        let crossing = composite.add_surface(patch, &surface);
         composite.carry_sets(before, (&cell, of_patch));
-        composite.carry_facets(before, patch, &surface, &cell);
+        composite.carry_facets(before, patch, (&surface, &crossing), &cell);
         composite
     }
 
@@ -151,11 +152,16 @@ impl<const D: usize> Composite<D> {
         lost.iter().for_each(|corners| embedded.hide(corners));
     }
 
-    /// Adds the surface that crosses cells of the patch.
-    fn add_surface(&mut self, patch: &PatchCells<D>, surface: &PatchSurface<D>) {
+    /// Adds the surface that crosses cells of the patch; returns its facets by the corners of those that they are parts of.
+    fn add_surface(
+        &mut self,
+        patch: &PatchCells<D>,
+        surface: &PatchSurface<D>,
+    ) -> BTreeMap<Vec<u32>, Vec<Facet>> {
+        let mut of_facet: BTreeMap<Vec<u32>, Vec<Facet>> = BTreeMap::new();
         let number: BTreeMap<Index<D>, u32> = (patch.all.iter().copied()).zip(0..).collect();
         let mesh = &mut self.patched.mesh;
-        for (index, part, normal) in &surface.parts {
+        for (corners, index, part, normal) in &surface.parts {
             let first = mesh.nodes.len() as u32;
             mesh.nodes.extend_from_slice(&part.corners[..part.count]);
             let mut nodes: Facet = (first..mesh.nodes.len() as u32).collect();
@@ -167,8 +173,11 @@ impl<const D: usize> Composite<D> {
             if D > 1 && mesh.facet_normal_area(&facet).dot(normal) < 0.0 {
                 nodes.swap(0, 1);
             }
+            let own = of_facet.entry(corners.clone()).or_default();
+            own.push(nodes.clone());
             mesh.embedded.add_surface(number[index], nodes);
         }
+        of_facet
     }
 
     /// Carries the named sets over: cells and nodes that are left, the cells of the patch in sets of cells, and facets of cells that are left.
@@ -195,7 +204,7 @@ impl<const D: usize> Composite<D> {
         &mut self,
         before: &Mesh<D>,
         patch: &PatchCells<D>,
-        surface: &PatchSurface<D>,
+        (surface, crossing): (&PatchSurface<D>, &BTreeMap<Vec<u32>, Vec<Facet>>),
         cell: &[u32],
     ) {
         let corners = |facet: &[u32]| sorted(facet_corners::<D>(facet).to_vec());
@@ -211,6 +220,7 @@ impl<const D: usize> Composite<D> {
             for facet in set {
                 let corners = corners(facet);
                 let found = surface.met.get(&corners);
+                own.extend(crossing.get(&corners).into_iter().flatten().cloned());
                 for (face, part) in found.iter().flat_map(|found| &found.faces) {
                     *faces.entry(*face).or_insert(0.0) += part;
                 }

@@ -30,6 +30,7 @@ mod tie;
 #[cfg(test)]
 mod tests;
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -120,6 +121,8 @@ pub struct Patched<const D: usize> {
     pub torn: FxHashSet<String>,
     /// Cells of the rim.
     pub rim: usize,
+    /// Cells of second order that became linear.
+    pub linear: usize,
 }
 
 /// Lattice of a patch.
@@ -165,6 +168,8 @@ pub fn embed<const D: usize>(
     let width = 1 + (lattice.reach / cells.spacing - 1e-6).ceil() as i32;
     let patch = PatchCells::new(mesh, cells, width, is_wanted)?;
     patch.check_materials(material)?;
+    let (mesh, linear) = linear_at(mesh, &patch);
+    let mesh = mesh.as_ref();
     let cuts = Cuts::new(mesh, &patch)?;
     let mut rows = followers::of_mesh(mesh, &cuts, is_held)?;
     rows.extend(followers::of_rim(&patch)?);
@@ -173,7 +178,26 @@ pub fn embed<const D: usize>(
     let composite = Composite::new(mesh, &patch, &cuts);
     let patched = composite.with_followers(&followers::resolved(&rows, &patch)?);
     check_masses(&patched)?;
-    Ok(patched)
+    Ok(Patched { linear, ..patched })
+}
+
+/// The mesh with linear cells instead of those of second order that the patch meets, and how many there are.
+fn linear_at<'m, const D: usize>(
+    mesh: &'m Mesh<D>,
+    patch: &PatchCells<D>,
+) -> (Cow<'m, Mesh<D>>, usize) {
+    if !mesh.has_quadratic_cells() {
+        return (Cow::Borrowed(mesh), 0);
+    }
+    let mut is_met = vec![false; mesh.cell_count()];
+    for index in &patch.all {
+        for &(c, _) in &patch.held[index] {
+            is_met[c as usize] |= mesh.shapes[c as usize].is_quadratic();
+        }
+    }
+    let mut linear = mesh.clone();
+    linear.linearise(|c| is_met[c]);
+    (Cow::Owned(linear), is_met.iter().filter(|is| **is).count())
 }
 
 /// Size, first and second moment of a part of a cell or a facet.

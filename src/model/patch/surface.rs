@@ -21,6 +21,9 @@ const INWARDS: f64 = 1e-3;
 /// Distance from a plane between cells within which a facet lies in it, in edges.
 const IN_PLANE: f64 = 1e-7;
 
+/// Size of a part, over that of a face of a cell, below which it has no normal.
+const SLIVER: f64 = 1e-13;
+
 /// Part of a facet below which it is nothing.
 const NOTHING: f64 = 1e-9;
 
@@ -40,8 +43,8 @@ pub(super) struct PatchSurface<const D: usize> {
     pub met: BTreeMap<Vec<u32>, MetFacet<D>>,
     /// Faces of cells at the surface of the body, with the part of each that is surface.
     pub faces: BTreeMap<Face<D>, PartMoments<D>>,
-    /// Parts of other facets, each with its cell and the outward normal.
-    pub parts: Vec<(Index<D>, Simplex<D>, Vector<D>)>,
+    /// Parts of other facets, each with its cell and the outward normal, by the corners of the facet.
+    pub parts: Vec<(Vec<u32>, Index<D>, Simplex<D>, Vector<D>)>,
 }
 
 impl<const D: usize> PatchSurface<D> {
@@ -72,6 +75,8 @@ impl<const D: usize> PatchSurface<D> {
         let inwards = normal * (-INWARDS * edge);
         let mut left = PartMoments::about(mesh.nodes[facet.nodes[0] as usize]);
         let mut faces: BTreeMap<Face<D>, PartMoments<D>> = BTreeMap::new();
+        let mut corners = facet_corners::<D>(&facet.nodes).to_vec();
+        corners.sort_unstable();
         let (mut whole, mut is_met) = (0.0, false);
         for simplex in facet_simplices(mesh, &facet.nodes) {
             patch.cells.dice(
@@ -79,6 +84,9 @@ impl<const D: usize> PatchSurface<D> {
                 &|_, _| true,
                 &mut |index, part| {
                     let part = part.shifted(&-inwards);
+                    if part.size() <= SLIVER * edge.powi(D as i32 - 1) {
+                        return;
+                    }
                     whole += part.size();
                     if !patch.all.contains(&index) {
                         left.add(&part);
@@ -86,7 +94,7 @@ impl<const D: usize> PatchSurface<D> {
                     }
                     is_met = true;
                     if !is_face {
-                        self.parts.push((index, part, normal));
+                        self.parts.push((corners.clone(), index, part, normal));
                         return;
                     }
                     let face = Face {
@@ -107,8 +115,6 @@ impl<const D: usize> PatchSurface<D> {
             let about = || PartMoments::about(patch.cells.centre(&face.cell));
             self.faces.entry(*face).or_insert_with(about).join(part);
         }
-        let mut corners = facet_corners::<D>(&facet.nodes).to_vec();
-        corners.sort_unstable();
         let found = MetFacet {
             faces: (faces.into_iter())
                 .map(|(face, part)| (face, part.size))

@@ -220,7 +220,7 @@ fn blocks<const D: usize>(model: &Model<D>, bedding: &Bedding<D>) -> Blocks {
         Bedding::Normal { facets, stiffness } => {
             let k = |n: &Vector<D>, weight: f64| n * n.transpose() * (stiffness * weight);
             // with the nodes that its cell has in the model: cells at the seam are linear
-            let present = facets.iter().map(|f| mesh.facet((f.cell, f.local)));
+            let present = facets.iter().map(|f| mesh.present_facet(f));
             let (own, zone): (Vec<_>, Vec<_>) =
                 present.partition(|f| model.is_element(f.cell as usize));
             for facet in own {
