@@ -5,7 +5,7 @@ use super::conditions::Condition;
 use super::draft::Draft;
 use super::error::{SceneError, SceneErrorKind};
 use super::initial;
-use super::region::{self, Region};
+use super::region;
 use super::source::Span;
 use super::spec::{CouplingSpec, LatticeStart, RimSpec, SceneSpec, TransitionSpec, TruncatedSpec};
 use super::temperature;
@@ -227,11 +227,6 @@ fn conflict_with<const D: usize>(
     draft: &Draft<'_, D>,
     patched: &Patched<D>,
 ) -> Option<String> {
-    let facets = condition.term().map(|term| term.facets());
-    let of_support = condition.support().map(|support| match support {
-        Support::Set { facets, .. } => facets.iter().map(Vec::as_slice).collect(),
-        Support::Inside(_) => Vec::new(),
-    });
     let is_covered = |facet: &&[u32]| {
         let mut corners = facet_corners::<D>(facet).to_vec();
         corners.sort_unstable();
@@ -248,23 +243,11 @@ fn conflict_with<const D: usize>(
             format!("acts on `{name}`, whose edge divides a face of the zone or its rim")
         });
     }
-    let all = facets.or(of_support).unwrap_or_default();
-    if let Some(facet) = all.iter().find(|facet| is_covered(facet)) {
-        let x = draft.mesh.bounds_of(facet).0;
-        return Some(format!(
-            "acts on a facet at {:?}, of which the zone or its rim covers a part",
-            x.as_slice()
-        ));
-    }
-    let region: &Region<D> = match condition.support() {
-        Some(Support::Inside(region)) => region,
-        _ => return None,
-    };
-    let mesh = &patched.mesh;
-    let inside = region.select_nodes(mesh);
-    let node = (mesh.embedded.followers.keys()).find(|&&n| inside[n as usize])?;
+    let facets = condition.term().map(|term| term.facets()).unwrap_or_default();
+    let facet = facets.iter().find(|facet| is_covered(facet))?;
+    let x = draft.mesh.bounds_of(facet).0;
     Some(format!(
-        "holds the node of the rim at {:?}, which follows the mesh",
-        mesh.nodes[*node as usize].as_slice()
+        "acts on a facet at {:?}, of which the zone or its rim covers a part",
+        x.as_slice()
     ))
 }
