@@ -322,7 +322,7 @@ pub enum ModelError {
     },
     /// Faces cut the lattice in such a way that no energies of pieces make affine fields exact.
     #[error(
-        "the faces of the nonlocal zone cut the lattice where truncated bonds cannot be fitted to them: no {what} leave less than {residual:.1e} of the largest traction; let the faces follow the lattice (element edges a whole number of spacings long), use a horizon of three spacings or more or elements of two spacings or more at the seam, or couple by splice"
+        "the faces of the nonlocal zone cut the lattice where truncated bonds cannot be fitted to them: no {what} leave less than {residual:.1e} of the largest traction; give the zone a rim of its own on the lattice (zones.rim = \"own\"), let the faces follow the lattice (element edges a whole number of spacings long), use a horizon of three spacings or more or elements of two spacings or more at the seam, or couple by splice"
     )]
     Seam {
         /// Quantity that was sought.
@@ -332,7 +332,7 @@ pub enum ModelError {
     },
     /// The conditions of a seam are more than can be met in minutes.
     #[error(
-        "the faces of the nonlocal zone cut the lattice, and fitting truncated bonds to them takes factors of {conditions} conditions, {operations:.0e} operations or more where {most:.0e} are the limit; let the faces follow the lattice (element edges a whole number of spacings long), take a larger spacing or a smaller zone, or couple by splice"
+        "the faces of the nonlocal zone cut the lattice, and fitting truncated bonds to them takes factors of {conditions} conditions, {operations:.0e} operations or more where {most:.0e} are the limit; give the zone a rim of its own on the lattice (zones.rim = \"own\"), let the faces follow the lattice (element edges a whole number of spacings long), take a larger spacing or a smaller zone, or couple by splice"
     )]
     SeamTooLarge {
         /// Conditions on the energies of bonds that the seam cuts.
