@@ -243,7 +243,10 @@ fn conflict_with<const D: usize>(
             format!("acts on `{name}`, whose edge divides a face of the zone or its rim")
         });
     }
-    let facets = condition.term().map(|term| term.facets()).unwrap_or_default();
+    let facets = condition
+        .term()
+        .map(|term| term.facets())
+        .unwrap_or_default();
     let facet = facets.iter().find(|facet| is_covered(facet))?;
     let x = draft.mesh.bounds_of(facet).0;
     Some(format!(

@@ -119,12 +119,19 @@ pub(super) fn loaded_nodes<const D: usize>(
     }
     let integral = |site: usize| {
         let mut sum = Vector::<D>::zeros();
-        for (c, local) in model.cells_of_site(site) {
+        let mut add = |c: usize, local: usize, part: f64| {
             if model.is_element(c) {
                 fem::for_each_point(&model.mesh, c, fem::Rule::Stiffness, |p| {
-                    sum += p.gradient[local] * p.weight;
+                    sum += p.gradient[local] * (p.weight * part);
                 });
             }
+        };
+        model
+            .cells_of_site(site)
+            .for_each(|(c, local)| add(c, local, 1.0));
+        for &(follower, part) in model.followers_of_site(site) {
+            let cells = model.cells_of_node(follower);
+            cells.for_each(|(c, local)| add(c, local, part));
         }
         sum
     };

@@ -15,7 +15,7 @@ use crate::{
     tensor::Vector,
 };
 
-/// Distance into the body, in edges of a cell, at which facets are divided among cells: on the surface itself they may lie between two.
+/// Distance into the body, in edges of a cell, at which facets in planes between cells are divided among these.
 const INWARDS: f64 = 1e-3;
 
 /// Distance from a plane between cells within which a facet lies in it, in edges.
@@ -72,7 +72,10 @@ impl<const D: usize> PatchSurface<D> {
             (at - at.round()).abs() < IN_PLANE
         };
         let is_face = facet.nodes.iter().all(in_plane) && normal[axis].abs() > 1.0 - 1e-9;
-        let inwards = normal * (-INWARDS * edge);
+        let inwards = match is_face {
+            true => normal * (-INWARDS * edge),
+            false => Vector::zeros(),
+        };
         let mut left = PartMoments::about(mesh.nodes[facet.nodes[0] as usize]);
         let mut faces: BTreeMap<Face<D>, PartMoments<D>> = BTreeMap::new();
         let mut corners = facet_corners::<D>(&facet.nodes).to_vec();
