@@ -32,6 +32,8 @@ pub struct Embedded<const D: usize> {
     pub cut: FxHashMap<u32, CutCell>,
     /// Nodes that follow others, with weights that add up to one and are exact for affine fields. The others follow none.
     pub followers: BTreeMap<u32, Vec<(u32, f64)>>,
+    /// Rows by which nodes that follow hand on masses and loads, where it is not those of their displacement: as many, or none.
+    pub shares: BTreeMap<u32, Vec<(u32, f64)>>,
     /// Facets of one cell only that are no surface of the body, by their sorted corners.
     pub(super) inner: FxHashSet<[u32; 4]>,
     /// Facets of which only a part belongs to the surface, by their sorted corners, with a rule for the part.
@@ -60,6 +62,7 @@ impl<const D: usize> Default for Embedded<D> {
         Self {
             cut: FxHashMap::default(),
             followers: BTreeMap::new(),
+            shares: BTreeMap::new(),
             inner: FxHashSet::default(),
             cut_facets: FxHashMap::default(),
             pieces: FxHashMap::default(),

@@ -19,6 +19,7 @@ use crate::observe::summary::{Decision, RunSummary};
 use crate::progress::Progress;
 use crate::scene::draft::Draft;
 use crate::scene::expression::Expression;
+use crate::scene::rim;
 use crate::scene::source::read;
 use crate::scene::spec::KinematicsSpec;
 use crate::scene::{Scene, SceneError, SceneErrorKind, SceneSpec, Solve, Source};
@@ -34,9 +35,9 @@ fn placed<const D: usize>(
 ) -> Result<Box<PlacedScene<D>>, SceneError> {
     let draft = Draft::new(spec, kinematics, directory, name, fingerprint)?;
     let Some(found) = zone_placement::placed(&draft)? else {
-        return Ok(Box::new(draft.scene(None)?.into()));
+        return Ok(Box::new(rim::scene(&draft, None)?.into()));
     };
-    let mut scene = draft.scene(Some(&found.zone))?;
+    let mut scene = rim::scene(&draft, Some(&found.zone))?;
     scene.placement = Some(found.placement);
     let kept = found.kept.map(Arc::new);
     Ok(Box::new(PlacedScene { scene, kept }))

@@ -28,7 +28,7 @@ use super::validated::{Scene, Solver};
 use super::zones::Placed;
 use super::{
     adaptive_zone, agreement, coupling_selection, cracks_and_voids, elements, failure, initial,
-    lattice_regions, material_interfaces, output, rim, solve, zones,
+    lattice_regions, material_interfaces, output, solve, zones,
 };
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
@@ -125,9 +125,6 @@ impl<'a, const D: usize> Draft<'a, D> {
     /// # Errors
     /// A [`SceneError`] with place, value and remedy.
     pub fn scene(&self, placed: Option<&Placed>) -> Result<Scene<D>, SceneError> {
-        if let Some(span) = rim::wanted(self.spec).filter(|_| self.lattice.is_none()) {
-            return rim::scene(self, placed, span);
-        }
         let (mut scene, otherwise) = self.with_coupling(placed, None)?;
         if let Some(coupling) = otherwise.filter(|_| placed.is_none()) {
             // an alternative that is wrong itself is none

@@ -58,7 +58,7 @@ pub(crate) mod peridynamics;
 pub(crate) mod places;
 pub(crate) mod points;
 pub(crate) mod region;
-mod rim;
+pub(crate) mod rim;
 pub(crate) mod section;
 pub(crate) mod selected_coupling;
 pub(crate) mod solve;

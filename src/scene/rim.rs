@@ -26,16 +26,27 @@ use crate::tensor::Vector;
 const PER_CELL: u32 = 2;
 
 /// The place at which a scene asks for a rim of its own.
-pub(super) fn wanted(spec: &SceneSpec) -> Option<Span> {
+fn wanted(spec: &SceneSpec) -> Option<Span> {
     let rim = spec.zones.rim.as_ref()?;
     (*rim.get_ref() == RimSpec::Own).then(|| rim.span())
 }
 
-/// The scene whose seam runs along a rim of its own; `span` is where it asks for that.
+/// The scene with the zone that was placed, or with the one that it draws, and with a rim of its own around it if it asks for one.
 ///
 /// # Errors
 /// Those of the scene, and [`PatchError`] at the place of the zone.
-pub(super) fn scene<const D: usize>(
+pub(crate) fn scene<const D: usize>(
+    draft: &Draft<'_, D>,
+    placed: Option<&Placed>,
+) -> Result<Scene<D>, SceneError> {
+    match wanted(draft.spec) {
+        Some(span) => with_rim(draft, placed, span),
+        None => draft.scene(placed),
+    }
+}
+
+/// The scene whose seam runs along a rim of its own; `span` is where it asks for that.
+fn with_rim<const D: usize>(
     draft: &Draft<'_, D>,
     placed: Option<&Placed>,
     span: Span,
@@ -43,7 +54,8 @@ pub(super) fn scene<const D: usize>(
     refuse_others(draft.spec, &span)?;
     let truncated = CouplingSpec::Truncated(TruncatedSpec::default());
     let instead = draft.spec.coupling.is_none().then_some(&truncated);
-    let (before, _) = draft.with_coupling(placed, instead)?;
+    let touched = placed.is_none().then(|| touched(draft)).flatten();
+    let (before, _) = draft.with_coupling(placed.or(touched.as_ref()), instead)?;
     let conflict = |what: String, help: &str| {
         SceneError::new(SceneErrorKind::Conflict, what)
             .label(span.clone(), "a layer of elements on the lattice")
@@ -64,6 +76,7 @@ pub(super) fn scene<const D: usize>(
         corner,
         spacing,
         per_cell: 1,
+        has_masses: matches!(draft.solve, Solve::Explicit(_)),
         reach: reach(draft.spec, &before)
             .map_err(|what| conflict(what, "or use rim = \"mesh\""))?,
     };
@@ -124,10 +137,31 @@ pub(super) fn scene<const D: usize>(
     Ok(scene)
 }
 
+/// The cells of the mesh that a zone meets of which it holds no centroid, where there are some: it may be smaller than they are.
+fn touched<const D: usize>(draft: &Draft<'_, D>) -> Option<Placed> {
+    let (mesh, zone) = (&draft.mesh, draft.spec.zones.nonlocal.as_ref()?);
+    let region = region::region("zones.nonlocal", zone.get_ref(), mesh).ok()?;
+    let meets = |c: usize| {
+        let x = mesh.centroid(c);
+        let corners = mesh.corners(c).iter();
+        let radius = corners.map(|&n| (mesh.nodes[n as usize] - x).norm());
+        region
+            .distance(&x)
+            .map(|distance| distance <= radius.fold(0.0, f64::max))
+    };
+    let nonlocal: Vec<bool> = (0..mesh.cell_count()).map(meets).collect::<Option<_>>()?;
+    let is_needed = !region.select(mesh).contains(&true) && nonlocal.contains(&true);
+    is_needed.then(|| Placed {
+        nonlocal,
+        span: zone.span(),
+    })
+}
+
 /// Refuses what a zone with a rim of its own does not have.
 fn refuse_others(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
     let zones = &spec.zones;
     let others = [
+        ("zones.auto", zones.auto.is_some()),
         ("zones.follow", zones.follow.is_some()),
         ("zones.skin", zones.skin.is_some()),
         ("zones.bodies", !zones.bodies.is_empty()),
@@ -214,7 +248,9 @@ fn embedded<const D: usize>(
     };
     match draft.solve {
         Solve::Explicit(_) => match embed(PER_CELL) {
-            Err(PatchError::Empty { .. }) => embed(1),
+            Err(PatchError::Empty { .. } | PatchError::Mass { .. } | PatchError::Circle { .. }) => {
+                embed(1)
+            }
             found => found,
         },
         Solve::Static | Solve::QuasiStatic(_) => embed(1),

@@ -135,9 +135,17 @@ pub(super) fn loaded_nodes<const D: usize>(
         }
         sum
     };
+    // the surface of the body loads the nodes of an element that it cuts
+    let is_cut = |c: usize| model.mesh.embedded.pieces.contains_key(&(c as u32));
+    let is_at_surface = |site: usize| {
+        let mut own = model.cells_of_site(site);
+        let mut followers = model.followers_of_site(site).iter();
+        own.any(|(c, _)| is_cut(c))
+            || followers.any(|&(n, _)| model.cells_of_node(n).any(|(c, _)| is_cut(c)))
+    };
     let is_loaded = |site: usize| {
         let is_node = matches!(model.sites[site].kind, SiteKind::Node(_));
-        is_node && at_face[site] && !is_dropped[site]
+        is_node && at_face[site] && !is_dropped[site] && !is_at_surface(site)
     };
     let loads = parallel::filter_map(model.sites.len(), 1, |site| {
         is_loaded(site).then(|| (site as u32, integral(site)))

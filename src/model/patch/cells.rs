@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::PatchError;
+use super::error::PatchError;
 use crate::{
     mesh::Mesh,
     model::simplex::{Cells, Simplex, simplices_of},

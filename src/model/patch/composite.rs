@@ -5,9 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use rustc_hash::FxHashSet;
 
 use super::{
-    PartMoments, Patched, Place, Rows,
     cells::{Face, Index, PatchCells, block},
     cuts::Cuts,
+    moments::PartMoments,
+    rows::{Place, Rows},
     surface::PatchSurface,
 };
 use crate::{
@@ -19,6 +20,25 @@ use crate::{
 const HELD: f64 = 1e-6;
 
 const NONE: u32 = u32::MAX;
+
+/// A mesh with an embedded patch.
+#[derive(Clone, Debug)]
+pub struct Patched<const D: usize> {
+    /// Zone, rim, and what is left of the mesh.
+    pub mesh: Mesh<D>,
+    /// True for the cells of the zone.
+    pub nonlocal: Vec<bool>,
+    /// The cell of the mesh before whose material each cell has.
+    pub origin: Vec<u32>,
+    /// Facets of the surface of which the patch covers a part: their corners in the mesh before, sorted.
+    pub covered: FxHashSet<Vec<u32>>,
+    /// Named sets of facets that hold a part of a face of the patch.
+    pub torn: FxHashSet<String>,
+    /// Cells of the rim.
+    pub rim: usize,
+    /// Cells of second order that became linear.
+    pub linear: usize,
+}
 
 /// A mesh with its patch, but for the nodes that follow others.
 pub(super) struct Composite<const D: usize> {
@@ -255,18 +275,22 @@ impl<const D: usize> Composite<D> {
             .find(|facet| sorted(facet.clone()) == wanted)
     }
 
-    /// The mesh with the nodes that follow others.
-    pub fn with_followers(self, rows: &Rows<D>) -> Patched<D> {
+    /// The mesh with the nodes that follow others, in displacement by `rows`, in masses by `shares`.
+    pub fn with_followers(self, rows: &Rows<D>, shares: &Rows<D>) -> Patched<D> {
         let mut patched = self.patched;
         let number = |place: &Place<D>| match place {
             Place::Mesh(n) => self.node[*n as usize],
             Place::Patch(node) => self.node_of_patch[node],
         };
-        let followers = rows.iter().map(|(place, row)| {
-            let row = row.iter().map(|(followed, w)| (number(followed), *w));
-            (number(place), row.collect())
-        });
-        patched.mesh.embedded.followers = followers.collect();
+        let numbered = |rows: &Rows<D>| {
+            let rows = rows.iter().map(|(place, row)| {
+                let row = row.iter().map(|(followed, w)| (number(followed), *w));
+                (number(place), row.collect())
+            });
+            rows.collect()
+        };
+        patched.mesh.embedded.followers = numbered(rows);
+        patched.mesh.embedded.shares = numbered(shares);
         patched
     }
 }

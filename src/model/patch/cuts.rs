@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 
 use super::{
-    PartMoments, PatchError,
     cells::{GOOD, PatchCells},
-    may_be_cut,
+    error::PatchError,
+    moments::PartMoments,
 };
 use crate::{
     fem,
-    mesh::{CutCell, Mesh},
-    model::simplex::simplices_of,
+    mesh::{CellShape, CutCell, Mesh},
+    model::simplex::{as_box, simplices_of},
     parallel,
 };
 
@@ -101,4 +101,13 @@ fn parts<const D: usize>(mesh: &Mesh<D>, patch: &PatchCells<D>, c: usize) -> (Pa
         );
     }
     (outside, inside)
+}
+
+/// Returns true if a cell may be cut: its shape functions are polynomials in space.
+fn may_be_cut<const D: usize>(mesh: &Mesh<D>, c: usize) -> bool {
+    match mesh.shapes[c] {
+        CellShape::Line2 | CellShape::Tri3 | CellShape::Tet4 => true,
+        CellShape::Quad4 | CellShape::Hex8 => as_box(mesh, c).is_some(),
+        _ => false,
+    }
 }

@@ -3,10 +3,10 @@
 use std::collections::BTreeSet;
 
 use super::{
-    PatchError, Place, Row, Rows,
     cells::{GOOD, Index, PatchCells, block},
     cuts::Cuts,
-    gathered,
+    error::PatchError,
+    rows::{Place, Row, Rows, gathered},
 };
 use crate::{fem, mesh::Mesh, tensor::Vector};
 

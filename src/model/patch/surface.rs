@@ -5,9 +5,9 @@
 use std::collections::BTreeMap;
 
 use super::{
-    PartMoments,
     cells::{Face, Index, PatchCells},
     cuts::Cuts,
+    moments::PartMoments,
 };
 use crate::{
     mesh::{Mesh, boundary::BoundaryFacet, facet_corners},

@@ -9,10 +9,9 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::{
-    Place, Row,
     cells::{Face, Index, PatchCells},
     cuts::Cuts,
-    gathered,
+    rows::{Place, Row, gathered},
 };
 use crate::{
     fem,
@@ -23,7 +22,7 @@ use crate::{
 };
 
 /// Distance beyond Γ at which the mesh is cut by a plane, in edges of a cell: facets of the mesh in Γ itself then belong to the cells beyond.
-const BEYOND: f64 = 1e-7;
+const BEYOND: f64 = 1e-11;
 
 /// Part of a face below which it has no element beyond it, and above which less one it has everywhere, by rounding.
 const COVERED: f64 = 1e-6;
@@ -37,15 +36,29 @@ struct TiedFace<const D: usize> {
     is_whole: bool,
 }
 
-/// Rows of nodes of Γ: the face's node, `∫ ψ_i φ_i`, and the other terms of its equation, `∫ ψ_i φ_j` with the opposite sign and `∫ ψ_i N_a`.
-type FaceRows<const D: usize> = Vec<(Index<D>, f64, Row<D>)>;
+/// The equation of a node of Γ on a face.
+struct FaceRow<const D: usize> {
+    node: Index<D>,
+    /// `∫ ψ_i φ_i`.
+    diagonal: f64,
+    /// `∫ ψ_i N_a`, and `∫ ψ_i φ_j` with the opposite sign.
+    terms: Row<D>,
+}
 
-/// The row of each node of Γ that follows the mesh by the mortar: in nodes of the mesh and of the patch, others of Γ among them.
+/// Rows of a node of Γ in nodes of the mesh and of the patch.
+pub(super) struct TiedRow<const D: usize> {
+    /// By the mortar.
+    pub row: Row<D>,
+    /// By the shape functions of the element around the node: none is negative where that lies in one.
+    pub share: Row<D>,
+}
+
+/// The rows of each node of Γ that follows the mesh by the mortar.
 pub(super) fn rows<const D: usize>(
     mesh: &Mesh<D>,
     patch: &PatchCells<D>,
     cuts: &Cuts,
-) -> BTreeMap<Index<D>, Row<D>> {
+) -> BTreeMap<Index<D>, TiedRow<D>> {
     let all = patch.faces();
     let tied = parallel::map(all.len(), 4, |f| tied_face(mesh, patch, cuts, &all[f]));
     let tied: Vec<TiedFace<D>> = tied.into_iter().flatten().collect();
@@ -56,16 +69,51 @@ pub(super) fn rows<const D: usize>(
         face_rows(mesh, patch, &tied[f], &axes, &mass)
     });
     let mut sums: BTreeMap<Index<D>, (f64, Row<D>)> = BTreeMap::new();
-    for (node, diagonal, row) in found.into_iter().flatten() {
-        let sum = sums.entry(node).or_default();
-        sum.0 += diagonal;
-        sum.1.extend(row);
+    for own in found.into_iter().flatten() {
+        let sum = sums.entry(own.node).or_default();
+        sum.0 += own.diagonal;
+        sum.1.extend(own.terms);
     }
+    let mut shares = shares(mesh, patch, &tied);
     (sums.into_iter())
         .map(|(node, (diagonal, row))| {
             let row = gathered(row).into_iter();
-            (node, row.map(|(n, w)| (n, w / diagonal)).collect())
+            let row: Row<D> = row.map(|(n, w)| (n, w / diagonal)).collect();
+            let share = shares.remove(&node).unwrap_or_else(|| row.clone());
+            (node, TiedRow { row, share })
         })
+        .collect()
+}
+
+/// The shape functions at each node of Γ of the element beyond that holds it, or comes nearest to that.
+fn shares<const D: usize>(
+    mesh: &Mesh<D>,
+    patch: &PatchCells<D>,
+    tied: &[TiedFace<D>],
+) -> BTreeMap<Index<D>, Row<D>> {
+    let mut best: BTreeMap<Index<D>, (f64, Row<D>)> = BTreeMap::new();
+    for TiedFace { face, parts, .. } in tied {
+        let mut cells: Vec<u32> = parts.iter().map(|part| part.0).collect();
+        cells.dedup();
+        for node in face.nodes() {
+            let x = patch.node(&node);
+            for &c in &cells {
+                let Some(xi) = fem::reference_of(mesh, c as usize, &x) else {
+                    continue;
+                };
+                let (shape, count) = fem::shape_values(mesh, c as usize, &xi);
+                let least = shape[..count]
+                    .iter()
+                    .fold(1.0, |least: f64, w| least.min(*w));
+                if best.get(&node).is_none_or(|known| known.0 < least) {
+                    let nodes = mesh.cell(c as usize).iter().map(|&n| Place::Mesh(n));
+                    best.insert(node, (least, nodes.zip(shape).collect()));
+                }
+            }
+        }
+    }
+    (best.into_iter())
+        .map(|(node, (_, row))| (node, row))
         .collect()
 }
 
@@ -103,7 +151,7 @@ fn face_rows<const D: usize>(
     }: &TiedFace<D>,
     axes: &BTreeMap<Index<D>, usize>,
     mass_of_whole: &DMatrix<f64>,
-) -> FaceRows<D> {
+) -> Vec<FaceRow<D>> {
     let nodes = face.nodes();
     let kept: Vec<usize> = (0..nodes.len())
         .filter(|&i| axes[&nodes[i]] == face.axis && !patch.is_bad(&nodes[i]))
@@ -143,7 +191,11 @@ fn face_rows<const D: usize>(
     rows.map(|(k, (&own, mut row))| {
         let others = (0..nodes.len()).filter(|&j| j != own);
         row.extend(others.map(|j| (Place::Patch(nodes[j]), -moments[(k, j)])));
-        (nodes[own], moments[(k, own)], gathered(row))
+        FaceRow {
+            node: nodes[own],
+            diagonal: moments[(k, own)],
+            terms: gathered(row),
+        }
     })
     .collect()
 }

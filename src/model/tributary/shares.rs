@@ -29,8 +29,26 @@ impl<const D: usize> Model<D> {
     }
 }
 
+/// The weights of all nodes beside an embedded patch: its ties hand on displacements by weights of either sign, and masses by those of the elements around.
+fn of_patch<const D: usize>(model: &Model<D>) -> Transfer {
+    let shares = &model.mesh.embedded.shares;
+    let row = |n: usize| -> Vec<(u32, f64)> {
+        let own = |n: usize| model.node_transfer.row(n);
+        match shares.get(&(n as u32)) {
+            None => own(n).collect(),
+            Some(row) => (row.iter())
+                .flat_map(|&(m, w)| own(m as usize).map(move |(site, v)| (site, v * w)))
+                .collect(),
+        }
+    };
+    Transfer::from_rows((0..model.mesh.nodes.len()).map(row))
+}
+
 /// The weights of all nodes, none of them negative where sites lie all around; none of a model whose nodes follow no such fit.
 pub(super) fn shares<const D: usize>(model: &Model<D>) -> Option<Transfer> {
+    if !model.mesh.embedded.shares.is_empty() {
+        return Some(of_patch(model));
+    }
     model.interface.constrained?;
     let barriers = model.peridynamics.as_ref();
     let barriers = Barriers::new(barriers.map_or(Vec::new(), |p| p.barriers.clone()));

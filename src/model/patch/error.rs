@@ -1,0 +1,62 @@
+//! Reasons for which a patch cannot be embedded.
+
+use crate::mesh::CellShape;
+
+/// Reasons for which a patch cannot be embedded.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PatchError {
+    /// No cell of the lattice has its centre in the zone and lies within the body.
+    #[error(
+        "no cell of the lattice, of edge {edge}, lies in the zone and within the body; make the zone larger or the spacing smaller"
+    )]
+    Empty {
+        /// Edge of the cells \[m\].
+        edge: f64,
+    },
+    /// Nodes at the rim follow one another.
+    #[error(
+        "nodes of the rim of the zone follow one another near {position:?}; move the zone, or take a smaller spacing"
+    )]
+    Circle {
+        /// Position of one of them \[m\].
+        position: Vec<f64>,
+    },
+    /// The outer face of the rim cuts a cell of a kind that it may not.
+    #[error(
+        "cell {cell}, a {shape:?}, at {position:?}, is cut by the rim of the zone; only lines, triangles, tetrahedra, and rectangles and cuboids along the axes may be"
+    )]
+    Kind {
+        /// Number of the cell.
+        cell: usize,
+        /// Its shape.
+        shape: CellShape,
+        /// Its middle \[m\].
+        position: Vec<f64>,
+    },
+    /// Cells of several materials meet in the patch.
+    #[error(
+        "the zone or its rim holds two materials at {position:?}; keep both away from the border of materials"
+    )]
+    Materials {
+        /// Middle of the cell of the lattice \[m\].
+        position: Vec<f64>,
+    },
+    /// No element near a node is left.
+    #[error(
+        "a node at {position:?} keeps no element of which enough is left beside the rim of the zone; refine the mesh there, or move the zone"
+    )]
+    Alone {
+        /// Its position \[m\].
+        position: Vec<f64>,
+    },
+    /// A node would have no mass.
+    #[error(
+        "the elements that are left at {position:?} beside the rim of the zone give a node the volume {volume:.3e}; move the zone, or refine the mesh there"
+    )]
+    Mass {
+        /// Position of the node \[m\].
+        position: Vec<f64>,
+        /// Its volume [m^D].
+        volume: f64,
+    },
+}

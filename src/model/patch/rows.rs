@@ -1,0 +1,36 @@
+//! Rows of nodes that follow others.
+
+use std::collections::BTreeMap;
+
+use rustc_hash::FxHashMap;
+
+use super::cells::Index;
+
+/// A node, of the mesh or of the patch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) enum Place<const D: usize> {
+    Mesh(u32),
+    Patch(Index<D>),
+}
+
+/// Weights of nodes.
+pub(super) type Row<const D: usize> = Vec<(Place<D>, f64)>;
+
+/// The row of each node that follows others.
+pub(super) type Rows<const D: usize> = BTreeMap<Place<D>, Row<D>>;
+
+/// Weights, over the largest of their row, that rounding leaves.
+const ROUNDING: f64 = 1e-15;
+
+/// Adds up the weights of each node.
+pub(super) fn gathered<const D: usize>(row: impl IntoIterator<Item = (Place<D>, f64)>) -> Row<D> {
+    let mut sums: FxHashMap<Place<D>, f64> = FxHashMap::default();
+    for (n, w) in row {
+        *sums.entry(n).or_insert(0.0) += w;
+    }
+    let largest = sums.values().fold(0.0, |most: f64, w| most.max(w.abs()));
+    let own = sums.into_iter();
+    let mut row: Row<D> = own.filter(|e| e.1.abs() > ROUNDING * largest).collect();
+    row.sort_unstable_by_key(|e| e.0);
+    row
+}
