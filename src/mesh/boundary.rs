@@ -3,26 +3,10 @@
 use rustc_hash::FxHashMap;
 
 use super::error::position;
-use super::{Embedded, Facet, Mesh, MeshError, facet_corners};
+pub use super::facet::BoundaryFacet;
+use super::facet::key;
+use super::{Facet, Mesh, MeshError, facet_corners};
 use crate::tensor::Vector;
-
-/// A facet seen from one of its cells.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct BoundaryFacet {
-    /// Its nodes, ordered so that its normal points out of `cell` (in 1D a single node).
-    pub nodes: Facet,
-    /// The cell that it belongs to.
-    pub cell: u32,
-    /// Its number in [`CellShape::facets`](super::CellShape::facets) of that cell.
-    pub local: u8,
-}
-
-impl BoundaryFacet {
-    /// Key of the facet, the same in all cells that share it: its corners.
-    pub(super) fn key<const D: usize>(&self) -> [u32; 4] {
-        key(facet_corners::<D>(&self.nodes).iter().copied())
-    }
-}
 
 /// A facet between cells of two classes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,14 +15,6 @@ pub struct InterfaceFacet {
     pub first: BoundaryFacet,
     /// Seen from the cell of the second class.
     pub second: BoundaryFacet,
-}
-
-/// Sorted node numbers of a facet, padded: the same for all cells that share it.
-pub(super) fn key(nodes: impl Iterator<Item = u32>) -> [u32; 4] {
-    let mut k = [u32::MAX; 4];
-    k.iter_mut().zip(nodes).for_each(|(k, n)| *k = n);
-    k.sort_unstable();
-    k
 }
 
 /// Facets that wait for their second cell, in a list for each smallest node: a few steps where a table of keys would hash.
@@ -95,7 +71,7 @@ impl<const D: usize> Mesh<D> {
 
     /// A facet with the nodes that its cell has in this mesh: cells may have been made linear since.
     pub fn present_facet(&self, facet: &BoundaryFacet) -> BoundaryFacet {
-        match facet.local == Embedded::<D>::CROSSING {
+        match facet.local == BoundaryFacet::CROSSING {
             true => facet.clone(),
             false => self.facet((facet.cell, facet.local)),
         }

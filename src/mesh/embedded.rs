@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::Facet;
-use super::boundary::BoundaryFacet;
+use super::facet::{BoundaryFacet, key};
 use crate::tensor::{Tensor, Vector, inverse};
 
 /// A quadrature rule of a cut cell: reference coordinates and weights.
@@ -104,24 +104,19 @@ impl<const D: usize> Embedded<D> {
 
     /// Adds a facet to the surface of the body in a cell that it crosses; its nodes, of which the normal points outwards, belong to no cell.
     pub fn add_surface(&mut self, cell: u32, nodes: Facet) {
-        let key = super::boundary::key(nodes.iter().copied());
-        let local = Self::CROSSING;
+        let facet = key(nodes.iter().copied());
+        let local = BoundaryFacet::CROSSING;
         self.surface
-            .insert(key, BoundaryFacet { nodes, cell, local });
+            .insert(facet, BoundaryFacet { nodes, cell, local });
     }
 
     /// The facet of the surface with these nodes, where the surface crosses a cell.
     pub fn crossing(&self, nodes: &[u32]) -> Option<&BoundaryFacet> {
         match self.surface.is_empty() || nodes.len() > 4 {
             true => None,
-            false => self
-                .surface
-                .get(&super::boundary::key(nodes.iter().copied())),
+            false => self.surface.get(&key(nodes.iter().copied())),
         }
     }
-
-    /// Number of a facet within its cell that stands for the surface that crosses the cell.
-    pub const CROSSING: u8 = u8::MAX;
 
     /// The rules of a cell, where only a part of it belongs to the body.
     #[inline]
@@ -137,22 +132,21 @@ impl<const D: usize> Embedded<D> {
         match self.cut_facets.is_empty() {
             true => None,
             false => {
-                let key = super::boundary::key(corners.iter().copied());
-                self.cut_facets.get(&key).map(Vec::as_slice)
+                let facet = key(corners.iter().copied());
+                self.cut_facets.get(&facet).map(Vec::as_slice)
             }
         }
     }
 
     /// Leaves of a facet, by its corners, a part with this rule of places \[m\] and weights [m^(D−1)].
     pub fn cut_facet_to(&mut self, corners: &[u32], rule: Vec<(Vector<D>, f64)>) {
-        let key = super::boundary::key(corners.iter().copied());
-        self.cut_facets.insert(key, rule);
+        let facet = key(corners.iter().copied());
+        self.cut_facets.insert(facet, rule);
     }
 
     /// Takes a facet, by its corners, out of the surface of the body.
     pub fn hide(&mut self, corners: &[u32]) {
-        self.inner
-            .insert(super::boundary::key(corners.iter().copied()));
+        self.inner.insert(key(corners.iter().copied()));
     }
 }
 

@@ -13,6 +13,7 @@
 //! | `vtu.rs`, `vtk_legacy.rs` | their two formats, `.vtu` and `.vtk` |
 //! | `vtu_data.rs`, `xml.rs` | data and tags of the former |
 //! | `quality.rs` | checks that refuse a mesh no element can live on |
+//! | `facet.rs` | a facet seen from its cell |
 //! | `boundary.rs` | boundary and interface facets, distances to them |
 //! | `conformity.rs` | conformity of cells, which have to meet face to face |
 //! | `visibility.rs` | bonds that leave the mesh |
@@ -29,6 +30,7 @@ mod conformity;
 mod dilate_erode;
 mod embedded;
 mod error;
+mod facet;
 pub mod generate;
 pub mod gmsh;
 mod gmsh_kinds;

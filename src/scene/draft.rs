@@ -120,6 +120,35 @@ impl<'a, const D: usize> Draft<'a, D> {
         })
     }
 
+    /// The same scene on another mesh of the body, with horizon and points as they were chosen on this one.
+    ///
+    /// # Errors
+    /// A [`SceneError`] for a condition that the other mesh does not bear.
+    pub fn on_mesh(
+        &self,
+        mesh: Mesh<D>,
+        cell_material: Vec<u16>,
+        lattice: Option<Peridynamics<D>>,
+    ) -> Result<Self, SceneError> {
+        let (spec, clock) = (self.spec, self.solve.clock());
+        Ok(Self {
+            spec,
+            kinematics: self.kinematics,
+            materials: self.materials.clone(),
+            cell_material,
+            conditions: condition_list::conditions(&spec.conditions, &mesh, clock)?,
+            temperature: temperature::temperature(spec.temperature.as_ref(), &mesh, clock)?,
+            initial: initial::initial(&spec.initial, &mesh, clock)?,
+            impactors: self.impactors.clone(),
+            solve: self.solve.clone(),
+            solver: self.solver,
+            name: self.name,
+            fingerprint: self.fingerprint.clone(),
+            lattice,
+            mesh,
+        })
+    }
+
     /// The scene with the zone that was placed; with the one that it draws where none was.
     ///
     /// # Errors
@@ -255,12 +284,11 @@ impl<'a, const D: usize> Draft<'a, D> {
         let traits = selected.traits;
         self.refuse_missing_peridynamics(&selected)?;
         let mut zones = zones::zones(spec, &selected, mesh, placed)?;
-        let peridynamics = (spec.peridynamics.as_ref())
-            .map(|p| match &self.lattice {
-                Some(chosen) => Ok(chosen.clone()),
-                None => peridynamics::peridynamics(p, traits.lattice, mesh, &zones),
-            })
-            .transpose()?;
+        let peridynamics = match (&self.lattice, &spec.peridynamics) {
+            (Some(chosen), _) => Some(chosen.clone()),
+            (None, None) => None,
+            (None, Some(p)) => Some(peridynamics::peridynamics(p, traits.lattice, mesh, &zones)?),
+        };
         let choices: Vec<Decision> = peridynamics.iter().flat_map(lattice_choices).collect();
         let peridynamics = peridynamics
             .map(|p| lattice_regions::bodies(spec, traits, p, mesh, &mut zones))

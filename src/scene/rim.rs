@@ -1,14 +1,11 @@
 //! The scene with a rim of its own around the nonlocal zone: horizon and points by the mesh as it is, everything else by the mesh with the patch.
 
-use super::condition_list;
 use super::conditions::Condition;
 use super::draft::Draft;
 use super::error::{SceneError, SceneErrorKind};
-use super::initial;
 use super::region;
 use super::source::Span;
 use super::spec::{CouplingSpec, LatticeStart, RimSpec, SceneSpec, TransitionSpec, TruncatedSpec};
-use super::temperature;
 use super::validated::Scene;
 use super::zones::Placed;
 use crate::fem::Locator;
@@ -90,51 +87,36 @@ fn with_rim<const D: usize>(
             ));
         }
     }
-    let choice = Decision {
-        choice: format!(
-            "a rim of {} elements of edge {} around the zone; {} elements of the mesh end at it{}",
-            patched.rim,
-            number(spacing * f64::from(per_cell)),
-            patched.mesh.embedded.cut.len() - patched.mesh.embedded.pieces.len(),
-            match patched.linear {
-                0 => String::new(),
-                n => format!(", {n} of second order are linear there"),
-            }
-        ),
-        why: "the scene asks for a rim of its own".to_owned(),
-    };
+    let choice = told(&patched, spacing * f64::from(per_cell));
     let zone = Placed {
         nonlocal: patched.nonlocal,
-        span: draft
-            .spec
-            .zones
-            .nonlocal
-            .as_ref()
-            .map_or(span, |zone| zone.span()),
+        span: (draft.spec.zones.nonlocal.as_ref()).map_or(span, |zone| zone.span()),
     };
     let cell_material = (patched.origin.iter())
         .map(|&c| draft.cell_material[c as usize])
         .collect();
-    let (spec, mesh, clock) = (draft.spec, patched.mesh, draft.solve.clock());
-    let draft = Draft {
-        spec,
-        kinematics: draft.kinematics,
-        materials: draft.materials.clone(),
-        cell_material,
-        conditions: condition_list::conditions(&spec.conditions, &mesh, clock)?,
-        temperature: temperature::temperature(spec.temperature.as_ref(), &mesh, clock)?,
-        initial: initial::initial(&spec.initial, &mesh, clock)?,
-        impactors: draft.impactors.clone(),
-        solve: draft.solve.clone(),
-        solver: draft.solver,
-        name: draft.name,
-        fingerprint: draft.fingerprint.clone(),
-        lattice: before.peridynamics,
-        mesh,
-    };
+    let draft = draft.on_mesh(patched.mesh, cell_material, before.peridynamics)?;
     let (mut scene, _) = draft.with_coupling(Some(&zone), instead)?;
     scene.choices.push(choice);
     Ok(scene)
+}
+
+/// Says how large the rim is, and what of the mesh ends at it.
+fn told<const D: usize>(patched: &Patched<D>, edge: f64) -> Decision {
+    let embedded = &patched.mesh.embedded;
+    let linear = match patched.linear {
+        0 => String::new(),
+        n => format!(", {n} of second order are linear there"),
+    };
+    Decision {
+        choice: format!(
+            "a rim of {} elements of edge {} around the zone; {} elements of the mesh end at it{linear}",
+            patched.rim,
+            number(edge),
+            embedded.cut.len() - embedded.pieces.len(),
+        ),
+        why: "the scene asks for a rim of its own".to_owned(),
+    }
 }
 
 /// The cells of the mesh that a zone meets of which it holds no centroid, where there are some: it may be smaller than they are.

@@ -2,7 +2,7 @@
 
 use crate::fem;
 use crate::mesh::boundary::BoundaryFacet;
-use crate::mesh::{Embedded, Mesh, facet_corners};
+use crate::mesh::{Mesh, facet_corners};
 use crate::model::Model;
 use crate::tensor::{Tensor, Tensor4, Vector};
 
@@ -52,7 +52,7 @@ pub(super) fn boundary_integrals<const D: usize>(model: &Model<D>) -> Vec<(u32, 
     let mesh = &model.mesh;
     let mut list = Vec::new();
     let mut add = |facet: &BoundaryFacet| {
-        let nodes = match facet.local == Embedded::<D>::CROSSING {
+        let nodes = match facet.local == BoundaryFacet::CROSSING {
             true => mesh.cell(facet.cell as usize),
             false => &facet.nodes,
         };
@@ -89,7 +89,7 @@ pub(super) fn boundary_integrals<const D: usize>(model: &Model<D>) -> Vec<(u32, 
 
 /// `∫ N_a n dA` of each node of a facet.
 fn shares<const D: usize>(mesh: &Mesh<D>, facet: &BoundaryFacet) -> Vec<Vector<D>> {
-    if facet.local == Embedded::<D>::CROSSING {
+    if facet.local == BoundaryFacet::CROSSING {
         return shares_of_cell(mesh, facet);
     }
     let count = facet.nodes.len();
