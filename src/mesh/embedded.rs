@@ -118,6 +118,11 @@ impl<const D: usize> Embedded<D> {
         }
     }
 
+    /// Returns true if a patch is embedded in the mesh.
+    pub fn has_patch(&self) -> bool {
+        !self.covered.cells.is_empty()
+    }
+
     /// The rules of a cell, where only a part of it belongs to the body.
     #[inline]
     pub fn cut_cell(&self, c: usize) -> Option<&CutCell> {

@@ -123,7 +123,8 @@ pub(super) fn fit<const D: usize>(
     };
     let state = state_of(segments)?;
     let is_negative = state.is_some_and(|s| s.modulus.get(0, 0, 0, 0) < 0.0);
-    let follows = follows(&missing);
+    // the faces of a zone with a rim of its own are those of lattice cells; what is missing there is the surface of the body
+    let follows = segments.model.mesh.embedded.has_patch() || follows(&missing);
     if state.is_some_and(|s| s.deviator != 0.0) {
         // factors, and shares of one dilatation, are not those of two
         return match follows {
