@@ -8,6 +8,7 @@ mod convergence;
 mod crack;
 mod meshes;
 mod structure;
+mod surfaces;
 
 use meshes::{Body, Random};
 
