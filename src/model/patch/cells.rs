@@ -16,6 +16,9 @@ const PART: f64 = 1e-9;
 /// Part of an element's volume in the body that its nodes need to follow no others.
 pub(super) const GOOD: f64 = 0.3;
 
+/// Cells around zone and rim of which it is known what lies there: strips of the mesh up to a surface are taken in.
+const MARGIN: i32 = 8;
+
 /// A cell of the lattice.
 pub(super) type Index<const D: usize> = [i32; D];
 
@@ -28,6 +31,8 @@ pub(super) struct PatchCells<const D: usize> {
     pub all: BTreeSet<Index<D>>,
     /// The cells of the mesh that have a part in each cell of the lattice in and around the patch, with its volume.
     pub held: BTreeMap<Index<D>, Vec<(u32, f64)>>,
+    /// Corners of the box of cells of which [`PatchCells::held`] is known.
+    limits: (Index<D>, Index<D>),
 }
 
 /// A face of a cell.
@@ -94,17 +99,17 @@ impl<const D: usize> PatchCells<D> {
         let Some((from, to)) = extent(&wanted) else {
             return Err(empty);
         };
-        let held = held(
-            mesh,
-            &cells,
-            from.map(|i| i - width - 2),
-            to.map(|i| i + width + 2),
+        let limits = (
+            from.map(|i| i - width - MARGIN),
+            to.map(|i| i + width + MARGIN),
         );
+        let held = held(mesh, &cells, limits.0, limits.1);
         let mut patch = Self {
             cells,
             zone: BTreeSet::new(),
             all: BTreeSet::new(),
             held,
+            limits,
         };
         patch.zone = (wanted.into_iter())
             .filter(|index| patch.is_material(index))
@@ -117,11 +122,7 @@ impl<const D: usize> PatchCells<D> {
                 patch.add(other);
             }
         }
-        while let Some(missing) = patch.missing() {
-            for index in missing {
-                patch.add(index);
-            }
-        }
+        patch.fill();
         Ok(patch)
     }
 
@@ -155,6 +156,30 @@ impl<const D: usize> PatchCells<D> {
     fn add(&mut self, index: Index<D>) {
         if self.is_material(&index) {
             self.all.insert(index);
+        }
+    }
+
+    /// Takes the cells around a place into the patch, and returns true if there are some that lie in the body.
+    pub fn absorb(&mut self, place: &Vector<D>) -> bool {
+        let (low, high) = self.limits;
+        let at = self.cells.index(place);
+        let before = self.all.len();
+        for index in block(at.map(|i| i - 1), at.map(|i| i + 1)) {
+            // what lies beyond has to be known
+            if (0..D).all(|i| index[i] > low[i] && index[i] < high[i]) {
+                self.add(index);
+            }
+        }
+        self.fill();
+        self.all.len() > before
+    }
+
+    /// Takes in what the patch must have too, until nothing is missing.
+    fn fill(&mut self) {
+        while let Some(missing) = self.missing() {
+            for index in missing {
+                self.add(index);
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! Reasons for which a patch cannot be embedded.
 
-use crate::mesh::CellShape;
+use crate::{mesh::CellShape, tensor::Vector};
 
 /// Reasons for which a patch cannot be embedded.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -59,4 +59,16 @@ pub enum PatchError {
         /// Its volume [m^D].
         volume: f64,
     },
+}
+
+impl PatchError {
+    /// The place at which elements or nodes are too few \[m\].
+    pub(super) fn place<const D: usize>(&self) -> Option<Vector<D>> {
+        match self {
+            Self::Circle { position } | Self::Alone { position } | Self::Mass { position, .. } => {
+                (position.len() == D).then(|| Vector::from_column_slice(position))
+            }
+            Self::Empty { .. } | Self::Kind { .. } | Self::Materials { .. } => None,
+        }
+    }
 }

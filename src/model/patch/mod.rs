@@ -81,26 +81,49 @@ pub fn embed<const D: usize>(
 ) -> Result<Patched<D>, PatchError> {
     let cells = lattice.cells(&mesh.bounds().0);
     let width = 1 + (lattice.reach / cells.spacing - 1e-6).ceil() as i32;
-    let patch = PatchCells::new(mesh, cells, width, is_wanted)?;
-    patch.check_materials(material)?;
-    let (mesh, linear) = linear_at(mesh, &patch);
+    let mut patch = PatchCells::new(mesh, cells, width, is_wanted)?;
+    for _ in 0..ABSORBED {
+        patch.check_materials(material)?;
+        let found = embedded(mesh, &patch, is_held, lattice.has_masses);
+        let Err(error) = &found else {
+            return found;
+        };
+        // a strip between the rim and a surface that no element carries: the rim goes to the surface
+        if !error.place().is_some_and(|x| patch.absorb(&x)) {
+            return found;
+        }
+    }
+    embedded(mesh, &patch, is_held, lattice.has_masses)
+}
+
+/// Strips of elements that a rim takes in, at most.
+const ABSORBED: usize = 60;
+
+/// The mesh with these cells as its patch.
+fn embedded<const D: usize>(
+    mesh: &Mesh<D>,
+    patch: &PatchCells<D>,
+    is_held: &dyn Fn(u32) -> bool,
+    has_masses: bool,
+) -> Result<Patched<D>, PatchError> {
+    let (mesh, linear) = linear_at(mesh, patch);
     let mesh = mesh.as_ref();
-    let cuts = Cuts::new(mesh, &patch)?;
+    let cuts = Cuts::new(mesh, patch)?;
     let mut rows = followers::of_mesh(mesh, &cuts, is_held)?;
-    rows.extend(followers::of_rim(&patch)?);
-    let tied = tie::rows(mesh, &patch, &cuts);
+    rows.extend(followers::of_rim(patch)?);
+    let tied = tie::rows(mesh, patch, &cuts);
     let (mut all, mut shares) = (rows.clone(), rows);
     for (node, own) in tied {
         all.insert(Place::Patch(node), own.row);
         shares.insert(Place::Patch(node), own.share);
     }
-    let composite = Composite::new(mesh, &patch, &cuts);
-    let all = followers::resolved(&all, &patch)?;
-    let shares = followers::resolved(&shares, &patch)?;
+    let composite = Composite::new(mesh, patch, &cuts);
+    let all = followers::resolved(&all, patch)?;
+    let shares = followers::resolved(&shares, patch)?;
     let mut patched = composite.with_followers(&all, &shares);
     if lightest(&patched, &patched.mesh.embedded.followers).is_none() {
         patched.mesh.embedded.shares.clear();
-    } else if lattice.has_masses
+    } else if has_masses
         && let Some((n, volume)) = lightest(&patched, &patched.mesh.embedded.shares)
     {
         return Err(PatchError::Mass {
