@@ -59,7 +59,12 @@ pub fn banded_law<const D: usize>(
 /// The width of the crack band of a cell \[m\].
 pub fn crack_band<const D: usize>(mesh: &Mesh<D>, cell: usize) -> f64 {
     let in_box = mesh.shapes[cell].in_box().len() as f64;
-    (in_box * cell_volume(mesh, cell).abs()).powf(1.0 / D as f64)
+    // strains localise between the nodes, whatever part of the cell is left
+    let volume = match mesh.embedded.cut_cell(cell) {
+        Some(_) => mesh.cell_volume(cell),
+        None => cell_volume(mesh, cell),
+    };
+    (in_box * volume.abs()).powf(1.0 / D as f64)
 }
 
 /// Local laws of cells: one of a material, or of a material and a width.

@@ -7,8 +7,8 @@ use crate::tensor::{Tensor, Vector, padded};
 
 /// Returns the rules of a part of a cell with a constant Jacobian: a simplex, or a box along the axes.
 ///
-/// The rule of masses has two points for each axis, `c ± √D l_k` of equal weight, with the centroid `c` and the columns `l_k` of a factor of the second moment
-/// about it, `L Lᵀ`: positive, and exact for polynomials of degree two, so also for the stiffness of a box. A simplex has constant gradients, and one point for its stiffness.
+/// The rule has two points along each axis, `c ± l_1 ± … ± l_D` of equal weight, with the centroid `c` and the columns `l_k` of a factor of the second moment
+/// about it, `L Lᵀ`: positive, exact for polynomials of degree two, and off the axes, so that no mode of a box is without energy. A simplex has constant gradients, and one point for its stiffness.
 ///
 /// `volume` \[m^D\], `centroid` \[m\] and `second`, the second moment about the centroid over the volume \[m²\], are those of the part. `None` if no element lives on the cell.
 pub fn rule_of_part<const D: usize>(
@@ -23,7 +23,7 @@ pub fn rule_of_part<const D: usize>(
     let at = |x: Vector<D>, part: f64| -> Option<([f64; 3], f64)> {
         Some((padded(&reference_of(mesh, c, &x)?), fraction * all * part))
     };
-    let part = 0.5 / D as f64;
+    let part = 1.0 / f64::from(1 << D);
     let mass: Option<CutRule> = (places_of_part(centroid, &second))
         .into_iter()
         .map(|x| at(x, part))
@@ -42,10 +42,12 @@ pub fn rule_of_part<const D: usize>(
 
 /// Places whose mean is exact for polynomials of degree two over a part with this centroid \[m\] and second moment about it, over its size \[m²\].
 pub fn places_of_part<const D: usize>(centroid: Vector<D>, second: &Tensor<D>) -> Vec<Vector<D>> {
-    let factor = cholesky(second) * (D as f64).sqrt();
-    (0..D)
-        .flat_map(|k| [1.0, -1.0].map(|sign| centroid + factor.column(k) * sign))
-        .collect()
+    let factor = cholesky(second);
+    let place = |bits: usize| {
+        let signs = Vector::<D>::from_fn(|k, _| if bits >> k & 1 == 1 { 1.0 } else { -1.0 });
+        centroid + factor * signs
+    };
+    (0..1usize << D).map(place).collect()
 }
 
 /// The lower factor of a positive semi-definite tensor; columns that rounding would make imaginary vanish.

@@ -109,21 +109,24 @@ impl<const D: usize> Mesh<D> {
         let mut facets = self.boundary_facets(0..self.cell_count() as u32);
         if !self.embedded.inner.is_empty() {
             facets.retain(|facet| !self.embedded.inner.contains(&facet.key::<D>()));
-            facets.extend(self.embedded.surface.values().cloned());
         }
+        facets.extend(self.embedded.surface.values().cloned());
         facets
     }
 
     /// For each cell whether it touches the boundary of the mesh, with a facet, an edge or a corner.
     pub fn cells_at_boundary(&self) -> Vec<bool> {
         let mut outer = vec![false; self.nodes.len()];
+        let mut crossed = vec![false; self.cell_count()];
         for facet in self.outer_facets() {
+            crossed[facet.cell as usize] |= facet.local == BoundaryFacet::CROSSING;
             for n in facet.nodes {
                 outer[n as usize] = true;
             }
         }
+        let touches = |c: usize| self.cell(c).iter().any(|&n| outer[n as usize]);
         (0..self.cell_count())
-            .map(|c| self.cell(c).iter().any(|&n| outer[n as usize]))
+            .map(|c| crossed[c] || touches(c))
             .collect()
     }
 

@@ -9,6 +9,7 @@ use rustc_hash::FxHashMap;
 use crate::{
     mesh::Mesh,
     model::{CellRole, ModelError},
+    tensor::Vector,
 };
 
 /// Tolerance on the distance of a mid-side node from the middle of its edge, over the edge's length, where a cell is made linear.
@@ -35,22 +36,27 @@ pub(crate) fn linear_at_seam<const D: usize>(
         .map(|c| mesh.corners(c).iter().any(|&n| at_seam[n as usize]))
         .collect();
     for c in (0..near.len()).filter(|&c| near[c]) {
-        for side in mesh.mid_sides(c) {
-            let [x, p, q] = [side.node, side.ends[0], side.ends[1]].map(|n| mesh.nodes[n as usize]);
-            let distance = (x - (p + q) * 0.5).norm() / (q - p).norm();
-            // also what is no number
-            if distance.is_nan() || distance > STRAIGHT {
-                return Err(ModelError::CurvedSeam {
-                    cell: c,
-                    shape: mesh.shapes[c],
-                    position: x.iter().copied().collect(),
-                    distance,
-                });
-            }
+        if let Some((x, distance)) = bent_side(&mesh, c) {
+            return Err(ModelError::CurvedSeam {
+                cell: c,
+                shape: mesh.shapes[c],
+                position: x.iter().copied().collect(),
+                distance,
+            });
         }
     }
     mesh.linearise(|c| near[c]);
     Ok(mesh)
+}
+
+/// A node of a cell that lies off the middle of its edge, with its distance from there over the length of the edge, if there is one.
+pub(crate) fn bent_side<const D: usize>(mesh: &Mesh<D>, c: usize) -> Option<(Vector<D>, f64)> {
+    mesh.mid_sides(c).find_map(|side| {
+        let [x, p, q] = [side.node, side.ends[0], side.ends[1]].map(|n| mesh.nodes[n as usize]);
+        let distance = (x - (p + q) * 0.5).norm() / (q - p).norm();
+        // also what is no number
+        (distance.is_nan() || distance > STRAIGHT).then_some((x, distance))
+    })
 }
 
 /// Nodes that follow others: in the middle of an edge the ends of this, around an embedded patch the nodes beyond its edge.

@@ -379,7 +379,7 @@ fn points_beyond<const D: usize>(
         }
         Domain::Surface(facets) => {
             for facet in facets {
-                let facet = mesh.facet((facet.cell, facet.local));
+                let facet = mesh.present_facet(facet);
                 beyond.outward_points(mesh, &facet, |x, w, n| add(x, w, n));
             }
         }

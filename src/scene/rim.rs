@@ -3,9 +3,12 @@
 use super::conditions::Condition;
 use super::draft::Draft;
 use super::error::{SceneError, SceneErrorKind};
-use super::region;
+use super::region::{self, Region};
 use super::source::Span;
-use super::spec::{CouplingSpec, LatticeStart, RimSpec, SceneSpec, TransitionSpec, TruncatedSpec};
+use super::spec::{
+    CouplingSpec, LatticeStart, RimSpec, SceneSpec, TransitionSpec, TruncatedSpec, ZonesNeeded,
+};
+use super::unused::Parts;
 use super::validated::Scene;
 use super::zones::Placed;
 use crate::fem::Locator;
@@ -36,7 +39,14 @@ pub(crate) fn scene<const D: usize>(
     draft: &Draft<'_, D>,
     placed: Option<&Placed>,
 ) -> Result<Scene<D>, SceneError> {
-    match wanted(draft.spec) {
+    // one model alone has no seam
+    let typed = draft
+        .spec
+        .coupling
+        .as_ref()
+        .map(|c| c.get_ref().traits().zones);
+    let is_alone = matches!(typed, Some(ZonesNeeded::Everywhere(_)));
+    match wanted(draft.spec).filter(|_| !is_alone) {
         Some(span) => with_rim(draft, placed, span),
         None => draft.scene(placed),
     }
@@ -73,6 +83,7 @@ fn with_rim<const D: usize>(
         corner,
         spacing,
         per_cell: 1,
+        within: around(draft, placed, &before),
         has_masses: matches!(draft.solve, Solve::Explicit(_)),
         reach: reach(draft.spec, &before)
             .map_err(|what| conflict(what, "or use rim = \"mesh\""))?,
@@ -98,6 +109,12 @@ fn with_rim<const D: usize>(
     let draft = draft.on_mesh(patched.mesh, cell_material, before.peridynamics)?;
     let (mut scene, _) = draft.with_coupling(Some(&zone), instead)?;
     scene.choices.push(choice);
+    let (spec, unused) = (draft.spec, &scene);
+    scene.unused = Parts {
+        spec,
+        scene: unused,
+    }
+    .unused();
     Ok(scene)
 }
 
@@ -119,7 +136,7 @@ fn told<const D: usize>(patched: &Patched<D>, edge: f64) -> Decision {
     }
 }
 
-/// The cells of the mesh that a zone meets of which it holds no centroid, where there are some: it may be smaller than they are.
+/// A cell of the mesh that a zone meets which holds no centroid, where there is one: the zone may be smaller than the cells.
 fn touched<const D: usize>(draft: &Draft<'_, D>) -> Option<Placed> {
     let (mesh, zone) = (&draft.mesh, draft.spec.zones.nonlocal.as_ref()?);
     let region = region::region("zones.nonlocal", zone.get_ref(), mesh).ok()?;
@@ -131,10 +148,12 @@ fn touched<const D: usize>(draft: &Draft<'_, D>) -> Option<Placed> {
             .distance(&x)
             .map(|distance| distance <= radius.fold(0.0, f64::max))
     };
-    let nonlocal: Vec<bool> = (0..mesh.cell_count()).map(meets).collect::<Option<_>>()?;
-    let is_needed = !region.select(mesh).contains(&true) && nonlocal.contains(&true);
-    is_needed.then(|| Placed {
-        nonlocal,
+    let meets: Vec<bool> = (0..mesh.cell_count()).map(meets).collect::<Option<_>>()?;
+    // one of them, so that others stay local
+    let first = meets.iter().position(|meets| *meets);
+    let first = first.filter(|_| !region.select(mesh).contains(&true))?;
+    Some(Placed {
+        nonlocal: (0..meets.len()).map(|c| c == first).collect(),
         span: zone.span(),
     })
 }
@@ -144,6 +163,8 @@ fn refuse_others(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
     let zones = &spec.zones;
     let others = [
         ("zones.auto", zones.auto.is_some()),
+        ("output.sections", !spec.output.sections.is_empty()),
+        ("impactors", !spec.impactors.is_empty()),
         ("zones.follow", zones.follow.is_some()),
         ("zones.skin", zones.skin.is_some()),
         ("zones.bodies", !zones.bodies.is_empty()),
@@ -189,6 +210,35 @@ fn reach<const D: usize>(spec: &SceneSpec, before: &Scene<D>) -> Result<f64, Str
     }
 }
 
+/// The region that a scene draws as its zone, if it does.
+fn drawn<const D: usize>(draft: &Draft<'_, D>, placed: Option<&Placed>) -> Option<Region<D>> {
+    let typed = (draft.spec.zones.nonlocal.as_ref()).filter(|_| placed.is_none())?;
+    region::region("zones.nonlocal", typed.get_ref(), &draft.mesh).ok()
+}
+
+/// Corners of a box around the cells of the mesh that the zone may meet.
+fn around<const D: usize>(
+    draft: &Draft<'_, D>,
+    placed: Option<&Placed>,
+    before: &Scene<D>,
+) -> (Vector<D>, Vector<D>) {
+    let (mesh, drawn) = (&draft.mesh, drawn(draft, placed));
+    let may_meet = |c: usize| {
+        let x = mesh.centroid(c);
+        match drawn.as_ref().and_then(|zone| zone.distance(&x)) {
+            Some(distance) => {
+                let corners = mesh.corners(c).iter();
+                let radius = corners.map(|&n| (mesh.nodes[n as usize] - x).norm());
+                distance <= radius.fold(0.0, f64::max)
+            }
+            None => before.zones[c] == Zone::Nonlocal,
+        }
+    };
+    let cells = (0..mesh.cell_count()).filter(|&c| may_meet(c));
+    let nodes: Vec<u32> = cells.flat_map(|c| mesh.corners(c)).copied().collect();
+    mesh.bounds_of(&nodes)
+}
+
 /// The mesh with the patch, and how many spacings its cells have along their edges.
 fn embedded<const D: usize>(
     draft: &Draft<'_, D>,
@@ -197,8 +247,7 @@ fn embedded<const D: usize>(
     lattice: PatchLattice<D>,
 ) -> Result<(Patched<D>, u32), PatchError> {
     let mesh = &draft.mesh;
-    let typed = (draft.spec.zones.nonlocal.as_ref()).filter(|_| placed.is_none());
-    let drawn = typed.and_then(|zone| region::region("zones.nonlocal", zone.get_ref(), mesh).ok());
+    let drawn = drawn(draft, placed);
     let locator = Locator::new(mesh, 0..mesh.cell_count());
     let is_wanted = |x: &Vector<D>| match drawn.as_ref().and_then(|zone| zone.distance(x)) {
         Some(distance) => distance <= 0.0,
@@ -230,6 +279,11 @@ fn embedded<const D: usize>(
     };
     match draft.solve {
         Solve::Explicit(_) => match embed(PER_CELL) {
+            // strings along the edges of a zone of bonds that end on faces close over planes alone
+            Ok((patched, _)) if D == 3 && is_zone_cut(&patched) => match embed(1) {
+                Ok((other, per_cell)) if !is_zone_cut(&other) => Ok((other, per_cell)),
+                _ => Ok((patched, PER_CELL)),
+            },
             Err(PatchError::Empty { .. } | PatchError::Mass { .. } | PatchError::Circle { .. }) => {
                 embed(1)
             }
@@ -239,7 +293,13 @@ fn embedded<const D: usize>(
     }
 }
 
-/// What a condition does that a patch does not bear, if it does.
+/// Returns true if the surface of the body cuts a cell of the zone.
+fn is_zone_cut<const D: usize>(patched: &Patched<D>) -> bool {
+    let mut cut = patched.mesh.embedded.pieces.keys();
+    cut.any(|&c| patched.nonlocal[c as usize])
+}
+
+/// The conflict of a condition with a patch that does not bear it, if there is one.
 fn conflict_with<const D: usize>(
     condition: &Condition<D>,
     draft: &Draft<'_, D>,
@@ -260,6 +320,24 @@ fn conflict_with<const D: usize>(
         return set.map(|name| {
             format!("acts on `{name}`, whose edge divides a face of the zone or its rim")
         });
+    }
+    if let Some(Support::Set { nodes, facets, .. }) = condition.support() {
+        if facets.is_empty() && nodes.iter().any(|n| patched.dropped.contains(n)) {
+            return Some(
+                "holds nodes that the zone or its rim covers; name a set of facets".to_owned(),
+            );
+        }
+        let crosses = |facet: &[u32]| {
+            let mut corners = facet_corners::<D>(facet).to_vec();
+            corners.sort_unstable();
+            patched.crossed.contains(&corners)
+        };
+        let facet = facets.iter().find(|facet| crosses(facet))?;
+        let x = draft.mesh.bounds_of(facet).0;
+        return Some(format!(
+            "holds a surface at {:?} that crosses elements of the rim, none of whose nodes lies on it",
+            x.as_slice()
+        ));
     }
     let facets = condition
         .term()

@@ -1,4 +1,4 @@
-//! What a zone with a rim of its own does not have is refused by name.
+//! Refusals by name of what a zone with a rim of its own does not have.
 
 use bondline::mesh::MeshParts;
 use bondline::{Condition, Material, Region, SceneBuilder, Silent};

@@ -19,6 +19,9 @@ pub(super) const GOOD: f64 = 0.3;
 /// Cells around zone and rim of which it is known what lies there: strips of the mesh up to a surface are taken in.
 const MARGIN: i32 = 8;
 
+/// Cells of the box around a zone, at most.
+const MOST: f64 = 2e8;
+
 /// A cell of the lattice.
 pub(super) type Index<const D: usize> = [i32; D];
 
@@ -33,6 +36,8 @@ pub(super) struct PatchCells<const D: usize> {
     pub held: BTreeMap<Index<D>, Vec<(u32, f64)>>,
     /// Corners of the box of cells of which [`PatchCells::held`] is known.
     limits: (Index<D>, Index<D>),
+    /// True as long as no cell beyond was asked for.
+    is_known: bool,
 }
 
 /// A face of a cell.
@@ -69,15 +74,22 @@ impl<const D: usize> Face<D> {
 }
 
 impl<const D: usize> PatchCells<D> {
-    /// The cells whose centre is wanted, and a rim of so many cells around them.
+    /// The cells whose centre is wanted and lies between two corners, and a rim of so many cells around them.
     pub fn new(
         mesh: &Mesh<D>,
         cells: Cells<D>,
         width: i32,
+        (low, high): (Vector<D>, Vector<D>),
         is_wanted: &(dyn Fn(&Vector<D>) -> bool + Sync),
     ) -> Result<Self, PatchError> {
-        let (low, high) = mesh.bounds();
         let (from, to) = cells.range(&low, &high);
+        let count: f64 = (0..D)
+            .map(|i| f64::from(to[i]) - f64::from(from[i]))
+            .product();
+        if count > MOST {
+            let edge = cells.spacing;
+            return Err(PatchError::Large { count, edge });
+        }
         let wanted: BTreeSet<Index<D>> = parallel::map(
             (to[0] - from[0] + 1).max(0) as usize,
             1,
@@ -110,6 +122,7 @@ impl<const D: usize> PatchCells<D> {
             all: BTreeSet::new(),
             held,
             limits,
+            is_known: true,
         };
         patch.zone = (wanted.into_iter())
             .filter(|index| patch.is_material(index))
@@ -123,7 +136,10 @@ impl<const D: usize> PatchCells<D> {
             }
         }
         patch.fill();
-        Ok(patch)
+        match patch.is_known {
+            true => Ok(patch),
+            false => Err(PatchError::Grown),
+        }
     }
 
     /// Refuses a patch whose cells hold several materials.
@@ -154,29 +170,58 @@ impl<const D: usize> PatchCells<D> {
 
     /// Takes a cell into the patch, if any of it lies in the body.
     fn add(&mut self, index: Index<D>) {
-        if self.is_material(&index) {
+        // what lies beyond a cell has to be known
+        let (low, high) = self.limits;
+        if (0..D).any(|i| index[i] <= low[i] || index[i] >= high[i]) {
+            self.is_known = false;
+        } else if self.is_material(&index) {
             self.all.insert(index);
+        }
+    }
+
+    /// Refuses a rim around one of whose nodes the body is not of one piece: an element of the rim would bridge a slit.
+    pub fn check_connected(&self, mesh: &Mesh<D>) -> Result<(), PatchError> {
+        let least = PART * self.cells.spacing.powi(D as i32);
+        let nodes: BTreeSet<Index<D>> = (self.all.iter().filter(|cell| self.is_rim(cell)))
+            .flat_map(|cell| block(*cell, cell.map(|i| i + 1)))
+            .collect();
+        let nodes: Vec<Index<D>> = nodes.into_iter().collect();
+        let torn = parallel::map(nodes.len(), 16, |k| {
+            let around = block(nodes[k].map(|i| i - 1), nodes[k]);
+            let rim = around.filter(|cell| self.is_rim(cell));
+            let held = rim.flat_map(|cell| self.held[&cell].iter());
+            let mut cells: Vec<u32> = held
+                .filter(|part| part.1 > least)
+                .map(|part| part.0)
+                .collect();
+            cells.sort_unstable();
+            cells.dedup();
+            !hang_together(mesh, &cells)
+        });
+        match torn.iter().position(|torn| *torn) {
+            None => Ok(()),
+            Some(k) => Err(PatchError::Torn {
+                position: self.node(&nodes[k]).iter().copied().collect(),
+            }),
         }
     }
 
     /// Takes the cells around a place into the patch, and returns true if there are some that lie in the body.
     pub fn absorb(&mut self, place: &Vector<D>) -> bool {
-        let (low, high) = self.limits;
         let at = self.cells.index(place);
         let before = self.all.len();
         for index in block(at.map(|i| i - 1), at.map(|i| i + 1)) {
-            // what lies beyond has to be known
-            if (0..D).all(|i| index[i] > low[i] && index[i] < high[i]) {
-                self.add(index);
-            }
+            self.add(index);
         }
         self.fill();
-        self.all.len() > before
+        self.is_known && self.all.len() > before
     }
 
     /// Takes in what the patch must have too, until nothing is missing.
     fn fill(&mut self) {
-        while let Some(missing) = self.missing() {
+        while self.is_known
+            && let Some(missing) = self.missing()
+        {
             for index in missing {
                 self.add(index);
             }
@@ -226,26 +271,54 @@ impl<const D: usize> PatchCells<D> {
         faces
     }
 
-    /// The axis of the plane part of Γ that each node of it belongs to.
-    pub fn axes(faces: &[Face<D>]) -> BTreeMap<Index<D>, usize> {
+    /// The axis of the plane part of Γ that each node of it belongs to: the lowest, unless a face of another part would keep no node, and those of the lowest keep another.
+    pub fn axes(&self, faces: &[Face<D>]) -> BTreeMap<Index<D>, usize> {
         let mut axes = BTreeMap::new();
-        for face in faces {
+        let mut around: BTreeMap<Index<D>, Vec<usize>> = BTreeMap::new();
+        for (f, face) in faces.iter().enumerate() {
             for node in face.nodes() {
                 let own = axes.entry(node).or_insert(face.axis);
                 *own = face.axis.min(*own);
+                around.entry(node).or_default().push(f);
+            }
+        }
+        for face in faces {
+            if self.kept(face, &axes).next().is_some() {
+                continue;
+            }
+            let nodes = face.nodes();
+            let mut free = nodes.iter().filter(|node| {
+                let mut of_part = around[*node]
+                    .iter()
+                    .filter(|f| faces[**f].axis == axes[*node]);
+                !self.is_bad(node) && of_part.all(|f| self.kept(&faces[*f], &axes).count() > 1)
+            });
+            if let Some(node) = free.next() {
+                axes.insert(*node, face.axis);
             }
         }
         axes
     }
 
+    /// The nodes of a face, by their numbers within it, that belong to its plane part and follow the mesh.
+    pub fn kept(
+        &self,
+        face: &Face<D>,
+        axes: &BTreeMap<Index<D>, usize>,
+    ) -> impl Iterator<Item = usize> {
+        let is_kept = |node: &Index<D>| axes[node] == face.axis && !self.is_bad(node);
+        let nodes = face.nodes();
+        let kept: Vec<usize> = (0..nodes.len()).filter(|&i| is_kept(&nodes[i])).collect();
+        kept.into_iter()
+    }
+
     /// Cells that the patch must have too: beside faces none of whose nodes belongs to their plane part, and where it touches itself along less than a face.
     fn missing(&self) -> Option<BTreeSet<Index<D>>> {
         let faces = self.faces();
-        let axes = Self::axes(&faces);
+        let axes = self.axes(&faces);
         let mut missing = BTreeSet::new();
         for face in &faces {
-            let is_kept = |node: &Index<D>| axes[node] == face.axis && !self.is_bad(node);
-            if !face.nodes().iter().any(is_kept) {
+            if self.kept(face, &axes).next().is_none() {
                 missing.insert(face.neighbour());
             }
         }
@@ -282,6 +355,25 @@ impl<const D: usize> PatchCells<D> {
     pub fn node(&self, index: &Index<D>) -> Vector<D> {
         self.cells.centre(index) - Vector::repeat(0.5 * self.cells.spacing)
     }
+}
+
+/// Returns true if cells of the mesh hang together by nodes.
+fn hang_together<const D: usize>(mesh: &Mesh<D>, cells: &[u32]) -> bool {
+    let mut rest: Vec<u32> = cells.to_vec();
+    let mut reached: Vec<u32> = rest.pop().into_iter().collect();
+    let mut k = 0;
+    while k < reached.len() {
+        let own = mesh.corners(reached[k] as usize);
+        rest.retain(|&c| {
+            let touches = mesh.corners(c as usize).iter().any(|n| own.contains(n));
+            if touches {
+                reached.push(c);
+            }
+            !touches
+        });
+        k += 1;
+    }
+    rest.is_empty()
 }
 
 /// Returns true if the cells around a node hang together by faces.

@@ -32,6 +32,10 @@ pub struct Patched<const D: usize> {
     pub origin: Vec<u32>,
     /// Facets of the surface of which the patch covers a part: their corners in the mesh before, sorted.
     pub covered: FxHashSet<Vec<u32>>,
+    /// Facets of which a part crosses elements of the rim: their corners in the mesh before, sorted.
+    pub crossed: FxHashSet<Vec<u32>>,
+    /// Nodes of the mesh before no cell of which is left.
+    pub dropped: FxHashSet<u32>,
     /// Named sets of facets that hold a part of a face of the patch.
     pub torn: FxHashSet<String>,
     /// Cells of the rim.
@@ -116,11 +120,18 @@ impl<const D: usize> Composite<D> {
                 origin,
                 covered: FxHashSet::default(),
                 torn: FxHashSet::default(),
+                crossed: FxHashSet::default(),
+                dropped: FxHashSet::default(),
             },
             node,
             node_of_patch,
         };
+        let dropped =
+            (0..composite.node.len() as u32).filter(|&n| composite.node[n as usize] == NONE);
+        composite.patched.dropped = dropped.collect();
         let surface = PatchSurface::new(before, patch, cuts);
+        let crossing = surface.parts.iter().filter(|part| patch.is_rim(&part.1));
+        composite.patched.crossed = crossing.map(|part| part.0.clone()).collect();
         composite.hide_facets(before, patch, &surface, &left);
         let crossing = composite.add_surface(patch, &surface);
         composite.carry_sets(before, (&cell, of_patch));

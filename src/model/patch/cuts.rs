@@ -86,7 +86,7 @@ impl Cuts {
     }
 }
 
-/// What of a cell lies outside the patch, and the volume inside.
+/// The part of a cell outside the patch, and the volume inside.
 fn parts<const D: usize>(mesh: &Mesh<D>, patch: &PatchCells<D>, c: usize) -> (PartMoments<D>, f64) {
     let mut outside = PartMoments::about(mesh.centroid(c));
     let mut inside = 0.0;

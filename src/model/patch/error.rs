@@ -13,6 +13,43 @@ pub enum PatchError {
         /// Edge of the cells \[m\].
         edge: f64,
     },
+    /// The zone asks for more cells than there may be.
+    #[error(
+        "the zone may hold {count:.1e} cells of the lattice, of edge {edge}; make the zone smaller or the spacing larger"
+    )]
+    Large {
+        /// Cells of the box around the zone.
+        count: f64,
+        /// Edge of the cells \[m\].
+        edge: f64,
+    },
+    /// The patch grew as far as is known what lies around it.
+    #[error(
+        "the rim of the zone has to reach too far from it to find elements that end at it; make the zone larger, or move it away from surfaces and thin parts"
+    )]
+    Grown,
+    /// The body is not of one piece within the elements around a node of the rim.
+    #[error(
+        "a slit or a gap narrower than a lattice cell crosses the rim of the zone at {position:?}, whose elements would bridge it; let the zone hold its tip, or end the zone before it"
+    )]
+    Torn {
+        /// Position of the node \[m\].
+        position: Vec<f64>,
+    },
+    /// A cell of second order that the patch meets has curved sides.
+    #[error(
+        "cell {cell}, a {shape:?}, meets the zone or its rim at {position:?}, where it has to be linear, and its side is not straight: a node lies {distance:.1e} of the edge from the middle; straighten the sides there, or keep the zone away from curved elements"
+    )]
+    Curved {
+        /// Number of the cell.
+        cell: usize,
+        /// Its shape.
+        shape: CellShape,
+        /// Position of the node \[m\].
+        position: Vec<f64>,
+        /// Its distance from the middle over the length of the edge.
+        distance: f64,
+    },
     /// Nodes at the rim follow one another.
     #[error(
         "nodes of the rim of the zone follow one another near {position:?}; move the zone, or take a smaller spacing"
@@ -68,7 +105,13 @@ impl PatchError {
             Self::Circle { position } | Self::Alone { position } | Self::Mass { position, .. } => {
                 (position.len() == D).then(|| Vector::from_column_slice(position))
             }
-            Self::Empty { .. } | Self::Kind { .. } | Self::Materials { .. } => None,
+            Self::Empty { .. }
+            | Self::Large { .. }
+            | Self::Grown
+            | Self::Torn { .. }
+            | Self::Curved { .. }
+            | Self::Kind { .. }
+            | Self::Materials { .. } => None,
         }
     }
 }

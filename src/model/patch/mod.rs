@@ -36,7 +36,12 @@ pub use self::{composite::Patched, error::PatchError};
 use std::{borrow::Cow, collections::BTreeMap};
 
 use self::{cells::PatchCells, composite::Composite, cuts::Cuts, rows::Place};
-use crate::{fem, mesh::Mesh, model::simplex::Cells, tensor::Vector};
+use crate::{
+    fem,
+    mesh::Mesh,
+    model::{seam_order, simplex::Cells},
+    tensor::Vector,
+};
 
 /// Lattice of a patch.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +54,8 @@ pub struct PatchLattice<const D: usize> {
     pub per_cell: u32,
     /// Distance from the zone up to which the rim reaches, beside one cell \[m\].
     pub reach: f64,
+    /// Corners of a box around the zone \[m\].
+    pub within: (Vector<D>, Vector<D>),
     /// True if the body moves: every node then needs a mass.
     pub has_masses: bool,
 }
@@ -81,9 +88,10 @@ pub fn embed<const D: usize>(
 ) -> Result<Patched<D>, PatchError> {
     let cells = lattice.cells(&mesh.bounds().0);
     let width = 1 + (lattice.reach / cells.spacing - 1e-6).ceil() as i32;
-    let mut patch = PatchCells::new(mesh, cells, width, is_wanted)?;
+    let mut patch = PatchCells::new(mesh, cells, width, lattice.within, is_wanted)?;
     for _ in 0..ABSORBED {
         patch.check_materials(material)?;
+        patch.check_connected(mesh)?;
         let found = embedded(mesh, &patch, is_held, lattice.has_masses);
         let Err(error) = &found else {
             return found;
@@ -106,7 +114,7 @@ fn embedded<const D: usize>(
     is_held: &dyn Fn(u32) -> bool,
     has_masses: bool,
 ) -> Result<Patched<D>, PatchError> {
-    let (mesh, linear) = linear_at(mesh, patch);
+    let (mesh, linear) = linear_at(mesh, patch)?;
     let mesh = mesh.as_ref();
     let cuts = Cuts::new(mesh, patch)?;
     let mut rows = followers::of_mesh(mesh, &cuts, is_held)?;
@@ -138,9 +146,9 @@ fn embedded<const D: usize>(
 fn linear_at<'m, const D: usize>(
     mesh: &'m Mesh<D>,
     patch: &PatchCells<D>,
-) -> (Cow<'m, Mesh<D>>, usize) {
+) -> Result<(Cow<'m, Mesh<D>>, usize), PatchError> {
     if !mesh.has_quadratic_cells() {
-        return (Cow::Borrowed(mesh), 0);
+        return Ok((Cow::Borrowed(mesh), 0));
     }
     let mut is_met = vec![false; mesh.cell_count()];
     for index in &patch.all {
@@ -148,9 +156,20 @@ fn linear_at<'m, const D: usize>(
             is_met[c as usize] |= mesh.shapes[c as usize].is_quadratic();
         }
     }
+    for c in (0..is_met.len()).filter(|&c| is_met[c]) {
+        if let Some((x, distance)) = seam_order::bent_side(mesh, c) {
+            return Err(PatchError::Curved {
+                cell: c,
+                shape: mesh.shapes[c],
+                position: x.iter().copied().collect(),
+                distance,
+            });
+        }
+    }
     let mut linear = mesh.clone();
     linear.linearise(|c| is_met[c]);
-    (Cow::Owned(linear), is_met.iter().filter(|is| **is).count())
+    let count = is_met.iter().filter(|is| **is).count();
+    Ok((Cow::Owned(linear), count))
 }
 
 /// A node of elements that follows none and has no positive volume, if there is one, where nodes that follow hand theirs on by these rows.

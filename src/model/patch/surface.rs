@@ -1,6 +1,6 @@
 //! Facets at the surface of the body that a patch covers, divided among its cells.
 //!
-//! Where a facet lies in a plane between lattice cells, the patch has faces of its own there. Elsewhere the parts of the facet are the surface of the cells that they cross.
+//! The patch has faces of its own where a facet lies in a plane between lattice cells. Elsewhere the parts of the facet are the surface of the cells that they cross.
 
 use std::collections::BTreeMap;
 
@@ -31,7 +31,7 @@ const NOTHING: f64 = 1e-9;
 pub(super) struct MetFacet<const D: usize> {
     /// Faces of the patch on it, with the size that they have in common.
     pub faces: Vec<(Face<D>, f64)>,
-    /// What is left of it.
+    /// The rest of it.
     pub left: PartMoments<D>,
     /// True if nothing is left of it.
     pub is_gone: bool,

@@ -63,7 +63,7 @@ pub(super) fn rows<const D: usize>(
     let tied = parallel::map(all.len(), 4, |f| tied_face(mesh, patch, cuts, &all[f]));
     let tied: Vec<TiedFace<D>> = tied.into_iter().flatten().collect();
     let faces: Vec<Face<D>> = tied.iter().map(|tied| tied.face).collect();
-    let axes = PatchCells::axes(&faces);
+    let axes = patch.axes(&faces);
     let mass = mass_of_face::<D>();
     let found = parallel::map(tied.len(), 4, |f| {
         face_rows(mesh, patch, &tied[f], &axes, &mass)
@@ -153,9 +153,7 @@ fn face_rows<const D: usize>(
     mass_of_whole: &DMatrix<f64>,
 ) -> Vec<FaceRow<D>> {
     let nodes = face.nodes();
-    let kept: Vec<usize> = (0..nodes.len())
-        .filter(|&i| axes[&nodes[i]] == face.axis && !patch.is_bad(&nodes[i]))
-        .collect();
+    let kept: Vec<usize> = patch.kept(face, axes).collect();
     let edge = patch.cells.spacing;
     let corner = patch.node(&nodes[0]);
     let phi = |x: &Vector<D>| shape_on_face(&((x - corner) / edge), face.axis);

@@ -46,7 +46,7 @@ fn of_patch<const D: usize>(model: &Model<D>) -> Transfer {
 
 /// The weights of all nodes, none of them negative where sites lie all around; none of a model whose nodes follow no such fit.
 pub(super) fn shares<const D: usize>(model: &Model<D>) -> Option<Transfer> {
-    if !model.mesh.embedded.shares.is_empty() {
+    if !model.mesh.embedded.shares.is_empty() && model.interface.constrained.is_none() {
         return Some(of_patch(model));
     }
     model.interface.constrained?;

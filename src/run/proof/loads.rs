@@ -185,7 +185,9 @@ fn coarser<const D: usize>(
                 let nodes = facet.nodes.iter().map(|&n| mesh.nodes[n as usize]);
                 let middle = nodes.sum::<Vector<D>>() / facet.nodes.len() as f64;
                 let area = mesh.facet_normal_area(facet);
-                sum += field(&middle, &area.normalize()) * area.norm();
+                // of a cut facet only a part is loaded
+                let part = fem::facet_area(mesh, &facet.nodes) / mesh.facet_area(&facet.nodes);
+                sum += field(&middle, &area.normalize()) * (area.norm() * part);
             }
         }
         Domain::Cells(region) => {

@@ -39,8 +39,12 @@ pub(super) fn skin<const D: usize>(model: &Model<D>) -> Skin {
     }
     let barriers = model.peridynamics.iter().flat_map(|p| &p.barriers);
     let barriers: Vec<_> = barriers.collect();
+    let without = match mesh.embedded.has_patch() {
+        true => Skin::Rim,
+        false => Skin::Possible,
+    };
     if barriers.is_empty() {
-        return Skin::Possible;
+        return without;
     }
     let at_surface = mesh.cells_at_boundary();
     // a crack along the face of a cell passes through it, too
@@ -52,7 +56,7 @@ pub(super) fn skin<const D: usize>(model: &Model<D>) -> Skin {
     };
     match { cells }.any(is_crossed) {
         true => Skin::Crossed,
-        false => Skin::Possible,
+        false => without,
     }
 }
 

@@ -100,7 +100,7 @@ pub enum SkinSpec {
 pub enum RimSpec {
     /// Those of the mesh.
     Mesh,
-    /// A layer of elements on the lattice of the points, tied to the mesh around it; the zone consists of cells of the lattice, whatever the mesh is. Coupling `truncated` only.
+    /// A layer of elements on the lattice of the points, tied to the mesh around it; the zone consists of cells of the lattice, whatever the mesh is.
     Own,
 }
 
