@@ -90,6 +90,12 @@ fn with_rim<const D: usize>(
     };
     let (patched, per_cell) = embedded(draft, placed, &before, lattice)
         .map_err(|error| conflict(format!("`zones.rim`: {error}"), "or use rim = \"mesh\""))?;
+    if D == 3 && ends_on_faces(&before) && is_zone_cut(&patched) {
+        return Err(conflict(
+            "`zones.rim`: a surface that follows no plane between lattice cells cuts the zone, whose bonds then have no balance along its edges in 3D".to_owned(),
+            "keep the zone inside of the body, let planes between the lattice's cells be its surface (peridynamics.points.lattice), use coupling.splice, or rim = \"mesh\"",
+        ));
+    }
     for condition in &draft.conditions {
         if let Some(what) = conflict_with(condition, draft, &patched) {
             return Err(conflict(
@@ -284,13 +290,26 @@ fn embedded<const D: usize>(
                 Ok((other, per_cell)) if !is_zone_cut(&other) => Ok((other, per_cell)),
                 _ => Ok((patched, PER_CELL)),
             },
-            Err(PatchError::Empty { .. } | PatchError::Mass { .. } | PatchError::Circle { .. }) => {
-                embed(1)
-            }
+            Err(
+                PatchError::Empty { .. }
+                | PatchError::Mass { .. }
+                | PatchError::Circle { .. }
+                | PatchError::Torn { .. }
+                | PatchError::Grown,
+            ) => embed(1),
             found => found,
         },
         Solve::Static | Solve::QuasiStatic(_) => embed(1),
     }
+}
+
+/// Returns true if the bonds of a scene end on the faces of its zone.
+fn ends_on_faces<const D: usize>(scene: &Scene<D>) -> bool {
+    let interface = scene
+        .coupling
+        .build(scene.point_law.linearised())
+        .interface();
+    interface.faces || interface.feet
 }
 
 /// Returns true if the surface of the body cuts a cell of the zone.

@@ -271,7 +271,7 @@ impl<const D: usize> PatchCells<D> {
         faces
     }
 
-    /// The axis of the plane part of Γ that each node of it belongs to: the lowest, unless a face of another part would keep no node, and those of the lowest keep another.
+    /// The axis of the plane part of Γ that each node of it belongs to: the lowest, unless in 2D a face of another part would keep no node, and those of the lowest keep another.
     pub fn axes(&self, faces: &[Face<D>]) -> BTreeMap<Index<D>, usize> {
         let mut axes = BTreeMap::new();
         let mut around: BTreeMap<Index<D>, Vec<usize>> = BTreeMap::new();
@@ -283,7 +283,8 @@ impl<const D: usize> PatchCells<D> {
             }
         }
         for face in faces {
-            if self.kept(face, &axes).next().is_some() {
+            // rows of parts that take of one another need not resolve in 3D: there the patch takes the cell in
+            if D > 2 || self.kept(face, &axes).next().is_some() {
                 continue;
             }
             let nodes = face.nodes();

@@ -12,7 +12,7 @@ use super::{
     surface::PatchSurface,
 };
 use crate::{
-    fem::{self, Locator},
+    fem,
     mesh::{CellShape, Covered, Facet, Mesh, boundary::BoundaryFacet, facet_corners},
 };
 
@@ -85,16 +85,11 @@ impl<const D: usize> Composite<D> {
             }
         }
         let (mut nonlocal, mut origin) = (Vec::new(), Vec::new());
-        let locator = Locator::new(before, 0..before.cell_count());
         for index in &patch.all {
             mesh.push_cell(shape::<D>(), &corners(index, &node_of_patch));
             nonlocal.push(patch.zone.contains(index));
             let largest = patch.held[index].iter().max_by(|a, b| a.1.total_cmp(&b.1));
-            let middle = locator.locate(before, &patch.cells.centre(index), 1e-9);
-            origin.push(middle.map_or_else(
-                || largest.map_or(0, |part| part.0),
-                |found| found.cell as u32,
-            ));
+            origin.push(largest.map_or(0, |part| part.0));
         }
         cut_patch_cells(before, patch, &mut mesh);
         let of_patch = origin.len();
@@ -121,14 +116,13 @@ impl<const D: usize> Composite<D> {
                 covered: FxHashSet::default(),
                 torn: FxHashSet::default(),
                 crossed: FxHashSet::default(),
-                dropped: FxHashSet::default(),
+                dropped: (0..node.len() as u32)
+                    .filter(|&n| node[n as usize] == NONE)
+                    .collect(),
             },
             node,
             node_of_patch,
         };
-        let dropped =
-            (0..composite.node.len() as u32).filter(|&n| composite.node[n as usize] == NONE);
-        composite.patched.dropped = dropped.collect();
         let surface = PatchSurface::new(before, patch, cuts);
         let crossing = surface.parts.iter().filter(|part| patch.is_rim(&part.1));
         composite.patched.crossed = crossing.map(|part| part.0.clone()).collect();
