@@ -17,8 +17,8 @@
 //! ∫_Γ ψ_i (u_rim − u_mesh) dA = 0
 //! ```
 //!
-//! with functions ψ that are dual to the shape functions on each plane part of Γ [Wohlmuth2000] and add up to one, so that the tie carries a constant traction and the patch test passes. Each node of Γ has a row of its own. A node where parts of Γ
-//! with different normals meet belongs to the part whose axis comes first. Nodes of the mesh with no element of which enough is left follow the nearest one that has, as in aggregated cut elements [Badia2018].
+//! with functions ψ that are dual to the shape functions on each plane part of Γ \[Wohlmuth2000\] and add up to one, so that the tie carries a constant traction and the patch test passes. Each node of Γ has a row of its own. A node where parts of Γ
+//! with different normals meet belongs to the part whose axis comes first. Nodes of the mesh with no element of which enough is left follow the nearest one that has, as in aggregated cut elements \[Badia2018\].
 //! All of this is the transfer T of the model, and constant.
 
 mod cells;
