@@ -159,7 +159,7 @@
 //! let coupling: &dyn Coupling<1> = &Splice;
 //! let model = Model::new(body, coupling, None, &Silent)?;
 //! let operator = coupling.operator(&model)?;
-//! let stiffness = model.assemble(operator.as_ref(), &Silent);
+//! let stiffness = model.assemble(&operator, &Silent);
 //!
 //! // both ends are held, the right one 0.3 away from where it was
 //! let positions: Vec<_> = model.sites.iter().map(|s| padded(&s.position)).collect();

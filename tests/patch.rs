@@ -232,7 +232,7 @@ fn residual_of_law(case: &Case, material: &str) -> Result<f64, String> {
     } = block_of_law(case, material)?;
     let stiffness = {
         let operator = coupling.operator(&model).map_err(|e| e.to_string())?;
-        model.assemble_unscaled(operator.as_ref())
+        model.assemble_unscaled(&operator)
     };
     let tensor = *model.tensor_of_cell(0);
     let size = tensor.amax() / typed::YOUNGS_MODULUS;
@@ -316,7 +316,7 @@ fn forces_of_every_law_at_a_truncated_seam_are_derivatives_of_its_energy() {
             heat: None,
         };
         let symmetry = block.coupling.symmetry();
-        let system = CoupledSystem::new(model, operator.as_ref(), symmetry, |_| 1.0, &behaviour);
+        let system = CoupledSystem::new(model, &operator, symmetry, |_| 1.0, &behaviour);
         let system = match system {
             Ok(system) => system,
             // known to first order only: a scene with exact bonds is refused

@@ -59,10 +59,7 @@ impl<const D: usize> ZoneLayout<D> for Balanced {
 coupling_by_rows!(Balanced);
 
 impl Balanced {
-    fn rows<'a, const D: usize>(
-        &self,
-        model: &'a Model<D>,
-    ) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+    fn rows<'a, const D: usize>(&self, model: &'a Model<D>) -> Result<Operator<'a, D>, ModelError> {
         let Some(body) = model.body() else {
             return Ok(super::uncoupled::own_model(model));
         };
@@ -71,7 +68,7 @@ impl Balanced {
             state: state_share(body, model.spacing()),
         };
         let beta = blending::at_points(self.function, model, body);
-        Ok(Box::new(Blended::new(model, body, beta, share)?))
+        Ok(Blended::new(model, body, beta, share)?.operator())
     }
 }
 

@@ -1,8 +1,10 @@
 //! Force-based blending of peridynamics and classical elasticity.
 
+use std::sync::Arc;
+
 use crate::{
     assembly::Row,
-    coupling::{CellStresses, Definiteness, ExactStresses, MixedRows, Operator, SeamBonds},
+    coupling::{BodyBonds, Definiteness, Operator, Term, uncoupled::own_elements},
     mesh::Mesh,
     model::{
         CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout,
@@ -92,20 +94,13 @@ impl<const D: usize> ZoneLayout<D> for Blending {
 coupling_by_rows!(Blending);
 
 impl Blending {
-    fn rows<'a, const D: usize>(
-        &self,
-        model: &'a Model<D>,
-    ) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+    fn rows<'a, const D: usize>(&self, model: &'a Model<D>) -> Result<Operator<'a, D>, ModelError> {
         let Some(body) = model.body() else {
             return Ok(super::uncoupled::own_model(model));
         };
         let beta = at_points(Some(self.function), model, body);
-        Ok(Box::new(Blended::new(
-            model,
-            body,
-            beta,
-            SpliceShare::default(),
-        )?))
+        let rows = Blended::new(model, body, beta, SpliceShare::default())?;
+        Ok(rows.operator())
     }
 }
 
@@ -223,55 +218,39 @@ impl<'a, const D: usize> Blended<'a, D> {
     }
 }
 
-impl<const D: usize> Operator<D> for Blended<'_, D> {
-    fn add_row(&self, site: usize, row: &mut Row<D>) {
-        let Some((_, i)) = self.model.point_of(site) else {
-            self.model.add_element_rows(site, row);
-            return;
-        };
-        self.body
-            .add_force_row_of_parts(i, |j| self.weights(i, j), row);
-        if let Some(derivatives) = &self.derivatives[i] {
-            self.add_remainder(i, derivatives, row);
+impl<'a, const D: usize> Blended<'a, D> {
+    /// Finite elements, the bonds where β is 1 all around, and weighted bonds with their remainder: [SAND2015-7998] eq. (3.14).
+    pub fn operator(self) -> Operator<'a, D> {
+        let model = self.model;
+        let rows = Arc::new(self);
+        let [of_bonds, of_beta] = [Arc::clone(&rows), Arc::clone(&rows)];
+        let point = |site: usize| model.point_of(site).map(|(_, i)| i);
+        let is_alone = move |site| point(site).is_some_and(|i| of_bonds.is_alone(i));
+        Operator {
+            model,
+            terms: vec![
+                own_elements(model),
+                Term::Bonds(BodyBonds::alone(is_alone)),
+                Term::Rows(Box::new(move |site, row| {
+                    let Some(i) = point(site).filter(|i| !rows.is_alone(*i)) else {
+                        return;
+                    };
+                    rows.body
+                        .add_force_row_of_parts(i, |j| rows.weights(i, j), row);
+                    if let Some(derivatives) = &rows.derivatives[i] {
+                        rows.add_remainder(i, derivatives, row);
+                    }
+                })),
+            ],
+            beta: Box::new(move |site| point(site).map_or(0.0, |i| of_beta.beta[i])),
+            counts_materials: false,
+            definiteness: Definiteness::SumOfSquares,
         }
     }
 
-    fn counts_materials(&self) -> bool {
-        false
-    }
-
-    fn is_body_row(&self, site: usize) -> bool {
-        self.model
-            .point_of(site)
-            .is_some_and(|(_, i)| self.beta[i] == 1.0 && self.derivatives[i].is_none())
-    }
-
-    fn mixed_rows(&self) -> Option<&dyn MixedRows<D>> {
-        None
-    }
-
-    fn seam_bonds(&self) -> Option<SeamBonds<'_, D>> {
-        None
-    }
-
-    fn exact_stresses(&self) -> Option<ExactStresses<D>> {
-        None
-    }
-
-    fn beta(&self, site: usize) -> f64 {
-        self.model.point_of(site).map_or(0.0, |(_, i)| self.beta[i])
-    }
-
-    fn definiteness(&self) -> Definiteness {
-        Definiteness::SumOfSquares
-    }
-
-    fn additional_bonds(&self) -> usize {
-        0
-    }
-
-    fn cell_stresses(&self) -> Option<&dyn CellStresses<D>> {
-        None
+    /// Returns true if the row of a point is that of its bonds, unweighted.
+    fn is_alone(&self, i: usize) -> bool {
+        self.beta[i] == 1.0 && self.derivatives[i].is_none()
     }
 }
 

@@ -1,10 +1,4 @@
-//! Partial stresses of geometrically exact bonds, as what they have beyond the linear ones.
-//!
-//! ```text
-//!   f_s = Σ_j ν_j a_sj ,     ν_j = Σ T⟨ξ⟩ ⊗ ξ V
-//! ```
-//!
-//! Source: [SAND2015-7998] eq. (2.19) and (2.29): `a_sj` are the weights of a divergence, or gradients of shape functions at Gauss points. The rows of a seam have ν to first order in the displacement;
+//! Partial stresses of geometrically exact bonds, as what they have beyond the linear ones, [SAND2015-7998] eq. (2.19): the rows of [`PartialStresses`] have ν to first order in the displacement;
 //! this is the rest, so that everything that needs a stiffness at rest finds it in the rows.
 //!
 //! The family of a Gauss point is not that of a lattice point: its weights are fitted to fourth moments, which give the right stress to first order only.
@@ -18,6 +12,7 @@
 
 use std::sync::Arc;
 
+use super::PartialStresses;
 use crate::model::Model;
 use crate::{
     parallel,
@@ -50,20 +45,16 @@ pub struct ExactStresses<const D: usize> {
 }
 
 impl<const D: usize> ExactStresses<D> {
-    /// Of the points that `weights` names for each site, in `body` or in that of the model; `gradients` are those of the shape functions at a Gauss point, none at another point.
-    ///
-    /// None where there are no points.
-    pub fn new(
-        model: &Model<D>,
-        body: Option<Arc<PdBody<D>>>,
-        weights: impl Fn(usize) -> Vec<(usize, Vector<D>)>,
-        gradients: impl Fn(usize) -> Vec<NodeGradient<D>>,
-    ) -> Option<Self> {
+    /// Of a term; none where it has no points.
+    pub fn new(stresses: &PartialStresses<'_, D>) -> Option<Self> {
+        let model = stresses.model;
         let law = Arc::clone(&model.peridynamics.as_ref()?.law);
+        let body = stresses.body.clone();
         let of = body.as_deref().or_else(|| model.body())?;
         let (mut first_weight, mut all) = (vec![0], Vec::new());
         for site in 0..model.sites.len() {
-            all.extend(weights(site).into_iter().map(|(j, a)| (j as u32, a)));
+            let on = (stresses.on_site)(site).into_iter();
+            all.extend(on.map(|(j, a)| (j as u32, a)));
             first_weight.push(all.len());
         }
         let mut points: Vec<u32> = all.iter().map(|(j, _)| *j).collect();
@@ -75,10 +66,19 @@ impl<const D: usize> ExactStresses<D> {
             let family = of.families.of(j as usize).iter();
             family.for_each(|&l| is_asked[l as usize] = true);
         }
-        let (mut first_gradient, mut held) = (vec![0], Vec::new());
+        let mut of_point = vec![Vec::new(); of.cloud.position.len()];
+        let mut quadrature = Vec::new();
+        for cell in 0..model.mesh.cell_count() {
+            let gauss_points = stresses.gauss_points(cell, &mut quadrature);
+            for (point, g) in gauss_points.zip(&quadrature) {
+                let nodes = model.mesh.cell(cell).iter().copied();
+                of_point[point] = nodes.zip(g.gradient).collect();
+            }
+        }
+        let (mut first_gradient, mut gradients) = (vec![0], Vec::new());
         for &j in &points {
-            held.extend(gradients(j as usize));
-            first_gradient.push(held.len());
+            gradients.append(&mut of_point[j as usize]);
+            first_gradient.push(gradients.len());
         }
         for (j, _) in &mut all {
             // every one is among them
@@ -89,7 +89,7 @@ impl<const D: usize> ExactStresses<D> {
             law,
             points,
             first_gradient,
-            gradients: held,
+            gradients,
             first_weight,
             weights: all,
             is_asked,

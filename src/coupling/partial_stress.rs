@@ -1,8 +1,10 @@
 //! Meshfree partial stress: transition points that feel the divergence of the peridynamic partial stress.
 
+use std::sync::Arc;
+
 use crate::{
     assembly::Row,
-    coupling::{CellStresses, Definiteness, ExactStresses, MixedRows, Operator, SeamBonds},
+    coupling::{BodyBonds, Definiteness, Operator, PartialStresses, Term, uncoupled::own_elements},
     mesh::Mesh,
     model::{
         CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout,
@@ -74,10 +76,7 @@ impl<const D: usize> ZoneLayout<D> for PartialStressMeshfree {
 coupling_by_rows!(PartialStressMeshfree);
 
 impl PartialStressMeshfree {
-    fn rows<'a, const D: usize>(
-        &self,
-        model: &'a Model<D>,
-    ) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+    fn rows<'a, const D: usize>(&self, model: &'a Model<D>) -> Result<Operator<'a, D>, ModelError> {
         let modulus = (model.peridynamics.as_ref())
             .map_or(0.0, |p| p.law.linearised().tensor().get(0, 0, 0, 0));
         let points = model.body().map_or(0, |body| body.families.len());
@@ -88,7 +87,7 @@ impl PartialStressMeshfree {
             shapes: Vec::new(),
         };
         rows.shapes = parallel::map(points, CHUNK, |i| rows.shape(i));
-        Ok(Box::new(rows))
+        Ok(rows.operator())
     }
 }
 
@@ -110,66 +109,44 @@ struct Meshfree<'a, const D: usize> {
     shapes: Vec<Option<(Tensor<D>, f64)>>,
 }
 
-impl<const D: usize> Operator<D> for Meshfree<'_, D> {
-    fn add_row(&self, site: usize, row: &mut Row<D>) {
-        let Some((body, i)) = self.model.point_of(site) else {
-            self.model.add_element_rows(site, row);
-            return;
+impl<'a, const D: usize> Meshfree<'a, D> {
+    /// Finite elements, the bonds of the nonlocal zone, and in the transition zone the divergence of partial stresses and the control.
+    fn operator(self) -> Operator<'a, D> {
+        let model = self.model;
+        let point = |site: usize, is_nonlocal: bool| {
+            let is_zone = |i: usize| (model.zone_of_point(i) == Zone::Nonlocal) == is_nonlocal;
+            model.point_of(site).filter(|(_, i)| is_zone(*i))
         };
-        if self.model.zone_of_point(i) == Zone::Nonlocal {
-            body.add_force_row(i, |_| 1.0, row);
-        } else {
-            body.add_partial_stresses(self.divergence(body, i), row);
-            self.add_control(body, i, row);
-        }
-    }
-
-    fn counts_materials(&self) -> bool {
-        false
-    }
-
-    fn is_body_row(&self, site: usize) -> bool {
-        self.model
-            .point_of(site)
-            .is_some_and(|(_, i)| self.model.zone_of_point(i) == Zone::Nonlocal)
-    }
-
-    fn beta(&self, site: usize) -> f64 {
-        match self.model.point_of(site) {
-            Some((_, i)) if self.model.zone_of_point(i) == Zone::Nonlocal => 1.0,
-            Some(_) => 0.5,
-            None => 0.0,
-        }
-    }
-
-    fn mixed_rows(&self) -> Option<&dyn MixedRows<D>> {
-        None
-    }
-
-    fn seam_bonds(&self) -> Option<SeamBonds<'_, D>> {
-        None
-    }
-
-    fn exact_stresses(&self) -> Option<ExactStresses<D>> {
-        let of_site = |site: usize| match self.model.point_of(site) {
-            Some((body, i)) if self.model.zone_of_point(i) != Zone::Nonlocal => {
-                self.divergence(body, i)
-            }
-            _ => Vec::new(),
+        let rows = Arc::new(self);
+        let on_site = {
+            let rows = Arc::clone(&rows);
+            move |site| point(site, false).map_or(Vec::new(), |(body, i)| rows.divergence(body, i))
         };
-        ExactStresses::new(self.model, None, of_site, |_| Vec::new())
-    }
-
-    fn definiteness(&self) -> Definiteness {
-        Definiteness::SumOfSquares
-    }
-
-    fn additional_bonds(&self) -> usize {
-        0
-    }
-
-    fn cell_stresses(&self) -> Option<&dyn CellStresses<D>> {
-        None
+        Operator {
+            model,
+            terms: vec![
+                own_elements(model),
+                Term::Bonds(BodyBonds::alone(move |site| point(site, true).is_some())),
+                Term::Stresses(PartialStresses {
+                    model,
+                    body: None,
+                    on_site: Box::new(on_site),
+                    first_of_cell: Vec::new(),
+                }),
+                Term::Rows(Box::new(move |site, row| {
+                    if let Some((body, i)) = point(site, false) {
+                        rows.add_control(body, i, row);
+                    }
+                })),
+            ],
+            beta: Box::new(move |site| match model.point_of(site) {
+                Some(_) if point(site, true).is_some() => 1.0,
+                Some(_) => 0.5,
+                None => 0.0,
+            }),
+            counts_materials: false,
+            definiteness: Definiteness::SumOfSquares,
+        }
     }
 }
 

@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use crate::coupling::partial_stress_fit::{FamilyFit, shapes};
 use crate::{
-    assembly::Row,
-    coupling::{CellStresses, Definiteness, ExactStresses, MixedRows, Operator, SeamBonds},
+    coupling::{
+        BodyBonds, Definiteness, NO_GAUSS_POINT, Operator, PartialStresses, Term,
+        uncoupled::own_elements,
+    },
     fem::{self, QuadraturePoint},
     mesh::Mesh,
     model::{CellRole, FitDegree, Interface, Model, ModelError, Reach, Zone, ZoneLayout},
@@ -15,7 +17,6 @@ use crate::{
         alike::{self},
     },
     system::Symmetry,
-    tensor::{Tensor, Vector},
 };
 
 /// Partial stress in finite elements.
@@ -68,11 +69,8 @@ impl<const D: usize> ZoneLayout<D> for PartialStressElements {
 coupling_by_rows!(PartialStressElements);
 
 impl PartialStressElements {
-    fn rows<'a, const D: usize>(
-        &self,
-        model: &'a Model<D>,
-    ) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
-        Elements::new(model).map(|operator| Box::new(operator) as _)
+    fn rows<'a, const D: usize>(&self, model: &'a Model<D>) -> Result<Operator<'a, D>, ModelError> {
+        Elements::new(model).map(Elements::operator)
     }
 }
 
@@ -80,7 +78,7 @@ struct Elements<'a, const D: usize> {
     model: &'a Model<D>,
     /// Points of the peridynamic zone, then Gauss points.
     body: Arc<PdBody<D>>,
-    /// First Gauss point of each cell in `body`; `u32::MAX` for a cell that is no stress element.
+    /// First Gauss point of each cell in `body`; [`NO_GAUSS_POINT`] for a cell that is no stress element.
     first: Vec<u32>,
 }
 
@@ -96,7 +94,7 @@ impl<'a, const D: usize> Elements<'a, D> {
         };
         let mut cloud = around.clone();
         let points = cloud.position.len();
-        let mut first = vec![u32::MAX; mesh.cell_count()];
+        let mut first = vec![NO_GAUSS_POINT; mesh.cell_count()];
         let mut horizon = Vec::new();
         let mut quadrature: Vec<QuadraturePoint<D>> = Vec::new();
         for (c, start) in first.iter_mut().enumerate() {
@@ -187,203 +185,52 @@ impl<'a, const D: usize> Elements<'a, D> {
 const WIDENING: f64 = 1.25;
 const WIDEST: f64 = 1.9;
 
-impl<const D: usize> Elements<'_, D> {
-    /// The Gauss points whose stresses the force of a node takes, with the weighted gradients of its shape function: [SAND2015-7998] eq. (2.20) in weak form; none for a point.
-    fn stresses_on(&self, site: usize) -> Vec<(usize, Vector<D>)> {
-        let (mut on, mut quadrature) = (Vec::new(), Vec::new());
-        for (c, local) in self.model.cells_of_site(site) {
-            if self.first[c] == u32::MAX {
-                continue;
-            }
-            fem::quadrature(&self.model.mesh, c, &mut quadrature);
-            for (q, g) in quadrature.iter().enumerate() {
-                on.push((self.first[c] as usize + q, g.gradient[local] * g.weight));
-            }
-        }
-        on
-    }
-}
-
-impl<const D: usize> Operator<D> for Elements<'_, D> {
-    fn add_row(&self, site: usize, row: &mut Row<D>) {
-        if let Some((body, i)) = self.model.point_of(site) {
-            body.add_force_row(i, |_| 1.0, row);
-            return;
-        }
-        self.model.add_element_rows(site, row);
-        self.body.add_partial_stresses(self.stresses_on(site), row);
-    }
-
-    fn counts_materials(&self) -> bool {
-        false
-    }
-
-    fn mixed_rows(&self) -> Option<&dyn MixedRows<D>> {
-        None
-    }
-
-    fn seam_bonds(&self) -> Option<SeamBonds<'_, D>> {
-        None
-    }
-
-    fn exact_stresses(&self) -> Option<ExactStresses<D>> {
-        let mut gradients = vec![Vec::new(); self.body.cloud.position.len()];
-        let mut quadrature = Vec::new();
-        for (c, &first) in self
-            .first
-            .iter()
-            .enumerate()
-            .filter(|(_, f)| **f != u32::MAX)
-        {
-            fem::quadrature(&self.model.mesh, c, &mut quadrature);
-            for (q, g) in quadrature.iter().enumerate() {
-                let nodes = self.model.mesh.cell(c).iter().copied();
-                gradients[first as usize + q] = nodes.zip(g.gradient).collect();
-            }
-        }
-        ExactStresses::new(
-            self.model,
-            Some(Arc::clone(&self.body)),
-            |site| self.stresses_on(site),
-            |j| gradients[j].clone(),
-        )
-    }
-
-    fn is_body_row(&self, site: usize) -> bool {
-        self.model.point_of(site).is_some()
-    }
-
-    fn beta(&self, site: usize) -> f64 {
-        if self.model.point_of(site).is_some() {
-            1.0
-        } else if self
-            .model
-            .cells_of_site(site)
-            .any(|(c, _)| self.first[c] != u32::MAX)
-        {
-            0.5
-        } else {
-            0.0
-        }
-    }
-
-    fn definiteness(&self) -> Definiteness {
-        Definiteness::SumOfSquares
-    }
-
-    fn additional_bonds(&self) -> usize {
-        self.body.bond_count()
-    }
-
-    fn cell_stresses(&self) -> Option<&dyn CellStresses<D>> {
-        Some(self)
-    }
-}
-
-impl<const D: usize> CellStresses<D> for Elements<'_, D> {
-    fn cell_stress(&self, cell: usize, u: &[f64]) -> Option<Tensor<D>> {
-        if self.first[cell] == u32::MAX {
-            return None;
-        }
-        let mut quadrature = Vec::new();
-        fem::quadrature(&self.model.mesh, cell, &mut quadrature);
-        let volume: f64 = quadrature.iter().map(|g| g.weight).sum();
-        Some(
-            quadrature
-                .iter()
-                .enumerate()
-                .map(|(q, g)| {
-                    self.body.partial_stress(self.first[cell] as usize + q, u) * (g.weight / volume)
-                })
-                .sum(),
-        )
-    }
-
-    fn sums_of_cell_stress(&self, cells: &[usize], fields: &[Vec<f64>]) -> Vec<[Tensor<D>; D]> {
-        let transfer = &self.body.cloud.transfer;
-        let at_places: Vec<Vec<f64>> = (fields.iter())
-            .map(|field| {
-                let at = |(site, weight): (u32, f64)| weight * field[site as usize];
-                (0..transfer.len())
-                    .map(|place| transfer.row(place).map(at).sum())
-                    .collect()
-            })
-            .collect();
-        let mut sums = vec![[Tensor::zeros(); D]; fields.len()];
-        let mut quadrature = Vec::new();
-        for &cell in cells.iter().filter(|&&c| self.first[c] != u32::MAX) {
-            fem::quadrature(&self.model.mesh, cell, &mut quadrature);
-            let volume: f64 = quadrature.iter().map(|g| g.weight).sum();
-            for (q, g) in quadrature.iter().enumerate() {
-                let point = self.first[cell] as usize + q;
-                self.add_stresses(point, &at_places, g.weight / volume, &mut sums);
-            }
-        }
-        sums
-    }
-}
-
-/// Components `a ≤ b ≤ c` of a symmetric tensor of third order in space.
-const THIRD: usize = 10;
-
-/// Number of a component of such a tensor, whatever the order of its indices.
-fn third(a: usize, b: usize, c: usize) -> usize {
-    let mut index = [a, b, c];
-    index.sort_unstable();
-    let [a, b, c] = index;
-    // those whose last index is less come first: 1, 4, then 10 of them
-    c * (c + 1) * (c + 2) / 6 + b * (b + 1) / 2 + a
-}
-
-impl<const D: usize> Elements<'_, D> {
-    /// Adds the partial stress of a Gauss point under each component of each field, which have one number per place, times `share`.
-    ///
-    /// The bonds enter by `Σ p ξ⊗ξ⊗ξ V Δf` and `Σ ω ξ V Δf` of each field, which serve all components of displacement.
-    fn add_stresses(
-        &self,
-        point: usize,
-        fields: &[Vec<f64>],
-        share: f64,
-        sums: &mut [[Tensor<D>; D]],
-    ) {
-        let body = &self.body;
-        let (pair, omega) = body.kernel(point);
-        let mut moments = vec![([0.0; THIRD], Vector::<D>::zeros()); fields.len()];
-        for (k, &l) in body.families.of(point).iter().enumerate() {
-            let l = l as usize;
-            let (xi, volume) = (body.bond(point, l), body.cloud.volume[l]);
-            let mut cubes = [0.0; THIRD];
-            for c in 0..D {
-                for b in 0..=c {
-                    for a in 0..=b {
-                        cubes[third(a, b, c)] = pair[k] * volume * xi[a] * xi[b] * xi[c];
+impl<'a, const D: usize> Elements<'a, D> {
+    /// Finite elements, the bonds of the points, and the partial stresses of Gauss points: [SAND2015-7998] eq. (2.20) in weak form.
+    fn operator(self) -> Operator<'a, D> {
+        let Self { model, body, first } = self;
+        let on_site = {
+            let first = first.clone();
+            move |site: usize| {
+                let (mut on, mut quadrature) = (Vec::new(), Vec::new());
+                for (c, local) in model.cells_of_site(site) {
+                    if first[c] == NO_GAUSS_POINT {
+                        continue;
+                    }
+                    fem::quadrature(&model.mesh, c, &mut quadrature);
+                    for (q, g) in quadrature.iter().enumerate() {
+                        on.push((first[c] as usize + q, g.gradient[local] * g.weight));
                     }
                 }
+                on
             }
-            let weighted = xi * omega.get(k).map_or(0.0, |omega| omega * volume);
-            for ((moment, gradient), field) in moments.iter_mut().zip(fields) {
-                let difference = field[l] - field[point];
-                for (moment, cube) in moment.iter_mut().zip(&cubes) {
-                    *moment += cube * difference;
+        };
+        let beta = {
+            let first = first.clone();
+            move |site: usize| {
+                let mut cells = model.cells_of_site(site);
+                match model.point_of(site) {
+                    Some(_) => 1.0,
+                    None if cells.any(|(c, _)| first[c] != NO_GAUSS_POINT) => 0.5,
+                    None => 0.0,
                 }
-                *gradient += weighted * difference;
             }
-        }
-        for ((moment, along), sums) in moments.iter().zip(sums) {
-            for (c, sum) in sums.iter_mut().enumerate() {
-                let mut stress = Tensor::<D>::from_fn(|a, b| moment[third(a, b, c)]);
-                if let Some(state) = body.state(point) {
-                    let mut gradient = Tensor::<D>::zeros();
-                    gradient.set_row(c, &along.transpose());
-                    // Σ p |ξ|² ξ·η V is the trace of what the pairs give
-                    let (theta, product) = (gradient.trace(), stress.trace());
-                    let products = state.shape * product + state.second * theta;
-                    stress += gradient * state.stabilisation
-                        + state.modulus.contract(&gradient) * state.shape
-                        - products * state.deviator;
-                }
-                *sum += stress * share;
-            }
+        };
+        Operator {
+            model,
+            terms: vec![
+                own_elements(model),
+                Term::Bonds(BodyBonds::alone(|site| model.point_of(site).is_some())),
+                Term::Stresses(PartialStresses {
+                    model,
+                    body: Some(body),
+                    on_site: Box::new(on_site),
+                    first_of_cell: first,
+                }),
+            ],
+            beta: Box::new(beta),
+            counts_materials: false,
+            definiteness: Definiteness::SumOfSquares,
         }
     }
 }

@@ -66,7 +66,7 @@ impl<const D: usize> Model<D> {
     }
 
     /// Adds the row that a site has in the stiffness: that of the operator times its [`Model::row_scale`].
-    pub fn add_scaled_row(&self, operator: &dyn Operator<D>, site: usize, row: &mut Row<D>) {
+    pub fn add_scaled_row(&self, operator: &Operator<'_, D>, site: usize, row: &mut Row<D>) {
         operator.add_row(site, row);
         if let Some(scale) = self.row_scale() {
             row.scale(scale[site]);
@@ -74,7 +74,7 @@ impl<const D: usize> Model<D> {
     }
 
     /// Assembles the stiffness: the rows of the operator, each times its [`Model::row_scale`].
-    pub fn assemble(&self, operator: &dyn Operator<D>, progress: &dyn Progress) -> BlockCsr {
+    pub fn assemble(&self, operator: &Operator<'_, D>, progress: &dyn Progress) -> BlockCsr {
         progress.stage("assembly", Some(self.sites.len() as u64));
         let matrix = assembly::assemble(
             self.sites.len(),
@@ -88,7 +88,7 @@ impl<const D: usize> Model<D> {
     /// Assembles the rows of some sites, in the order of `sites`: as [`Model::assemble`] does those of all.
     pub fn assemble_sites(
         &self,
-        operator: &dyn Operator<D>,
+        operator: &Operator<'_, D>,
         sites: &[u32],
         progress: &dyn Progress,
     ) -> BlockCsr {
@@ -118,13 +118,13 @@ impl<const D: usize> Model<D> {
     }
 
     /// Assembles the rows as the operator writes them, each an equation at its site: for studies of a method, whose sums of forces hold before rows are scaled.
-    pub fn assemble_unscaled(&self, operator: &dyn Operator<D>) -> BlockCsr {
+    pub fn assemble_unscaled(&self, operator: &Operator<'_, D>) -> BlockCsr {
         let sites: Vec<u32> = (0..self.sites.len() as u32).collect();
         self.assemble_sites_unscaled(operator, &sites)
     }
 
     /// The same rows of some sites, in the order of `sites`.
-    pub fn assemble_sites_unscaled(&self, operator: &dyn Operator<D>, sites: &[u32]) -> BlockCsr {
+    pub fn assemble_sites_unscaled(&self, operator: &Operator<'_, D>, sites: &[u32]) -> BlockCsr {
         assembly::assemble_rows(
             sites.len(),
             self.sites.len(),
@@ -136,7 +136,7 @@ impl<const D: usize> Model<D> {
     /// The pattern of the stiffness, without its values, and its products with `fields`.
     pub fn pattern(
         &self,
-        operator: &dyn Operator<D>,
+        operator: &Operator<'_, D>,
         fields: &[Vec<f64>],
         progress: &dyn Progress,
     ) -> assembly::Pattern {

@@ -11,10 +11,10 @@
 //! | `energy.rs`, `stored_energy.rs`, `dissipation.rs` | energies of elements and bonds, what breaking costs |
 //! | `split.rs`, `shared_work.rs`, `own_steps.rs`, `reached_sites.rs`, `spread_families.rs` | the same on several processes |
 //!
-//! Sites whose row is that of the peridynamic body alone ([`Operator::is_body_row`](crate::coupling::Operator::is_body_row)) take their force from a pass over the bonds, which may be geometrically exact
+//! Sites whose row is that of the peridynamic body alone ([`BondsOfSite::Alone`](crate::coupling::BondsOfSite::Alone)) take their force from a pass over the bonds, which may be geometrically exact
 //! and break; every other site takes it from its row of the linear stiffness, which those bonds do not enter. At rest both are the operator of the static solve.
 //!
-//! A seam that has bonds of its own ([`Operator::seam_bonds`](crate::coupling::Operator::seam_bonds)) takes those that are exact or break out of the rows too: what is left are finite elements.
+//! A seam that has bonds of its own ([`Term::SeamBonds`](crate::coupling::Term::SeamBonds)) takes those that are exact or break out of the rows too: what is left are finite elements.
 
 use std::sync::PoisonError;
 

@@ -60,7 +60,7 @@ impl<const D: usize> ZoneLayout<D> for Splice {
 }
 
 impl<const D: usize> Coupling<D> for Splice {
-    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Operator<'a, D>, ModelError> {
         Ok(own_model(model))
     }
 }

@@ -219,14 +219,9 @@ fn a_wave_keeps_its_energy_and_momentum_where_zones_change_under_it() {
         problem.body.zones = zones(&problem.body.mesh, within);
         let (model, coupling) = problem.lay_out(None, &Silent).unwrap();
         let operator = coupling.operator(&model).unwrap();
-        let mut system = CoupledSystem::new(
-            &model,
-            operator.as_ref(),
-            Symmetry::Symmetric,
-            |_| 1.0,
-            &behaviour,
-        )
-        .unwrap();
+        let mut system =
+            CoupledSystem::new(&model, &operator, Symmetry::Symmetric, |_| 1.0, &behaviour)
+                .unwrap();
         let mut begin = match state.take() {
             None => pulse(&model),
             Some((carried, old)) => {

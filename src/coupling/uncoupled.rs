@@ -1,10 +1,7 @@
 //! One model everywhere: pure finite elements and pure peridynamics, as couplings that have nothing to couple.
 
 use crate::{
-    assembly::Row,
-    coupling::{
-        CellStresses, Coupling, Definiteness, ExactStresses, MixedRows, Operator, SeamBonds,
-    },
+    coupling::{BodyBonds, Coupling, Definiteness, Operator, Term},
     dimension,
     mesh::Mesh,
     model::{CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout},
@@ -47,7 +44,7 @@ impl<const D: usize> ZoneLayout<D> for Local {
 }
 
 impl<const D: usize> Coupling<D> for Local {
-    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Operator<'a, D>, ModelError> {
         Ok(own_model(model))
     }
 }
@@ -87,68 +84,34 @@ impl<const D: usize> ZoneLayout<D> for Nonlocal {
 }
 
 impl<const D: usize> Coupling<D> for Nonlocal {
-    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Operator<'a, D>, ModelError> {
         Ok(own_model(model))
     }
 }
 
-type Own<const D: usize> = for<'a> fn(&'a Model<D>) -> Box<dyn Operator<D> + 'a>;
+type Own<const D: usize> = for<'a> fn(&'a Model<D>) -> Operator<'a, D>;
 
-/// The rows of a model of which each site takes the equation of its own model, [SAND2015-7998] eq. (2.30).
-pub(crate) fn own_model<'a, const D: usize>(model: &'a Model<D>) -> Box<dyn Operator<D> + 'a> {
-    fn rows<'a, const D: usize>(model: &'a Model<D>) -> Box<dyn Operator<D> + 'a> {
-        Box::new(OwnModel { model })
+/// A model of which each site takes the equation of its own model, `R` 1 for its own term and 0 for others, [SAND2015-7998] eq. (2.30): `L^pd` of eq. (2.5) at points, `L⁰` of (2.11) at nodes.
+pub(crate) fn own_model<const D: usize>(model: &Model<D>) -> Operator<'_, D> {
+    fn terms<const D: usize>(model: &Model<D>) -> Operator<'_, D> {
+        let is_point = |site: usize| model.point_of(site).is_some();
+        Operator {
+            model,
+            terms: vec![own_elements(model), Term::Bonds(BodyBonds::alone(is_point))],
+            beta: Box::new(move |site| f64::from(u8::from(is_point(site)))),
+            counts_materials: true,
+            definiteness: Definiteness::SumOfSquares,
+        }
     }
-    static OWN: (Own<1>, Own<2>, Own<3>) = (rows, rows, rows);
+    static OWN: (Own<1>, Own<2>, Own<3>) = (terms, terms, terms);
     dimension::of::<Own<D>>(&OWN)(model)
 }
 
-/// Each site takes the equation of its own model: `L^pd` of [SAND2015-7998] eq. (2.5) at points, `L⁰` of (2.11) at nodes.
-struct OwnModel<'a, const D: usize> {
-    model: &'a Model<D>,
-}
-
-impl<const D: usize> Operator<D> for OwnModel<'_, D> {
-    fn add_row(&self, site: usize, row: &mut Row<D>) {
-        match self.model.point_of(site) {
-            Some((body, point)) => body.add_force_row(point, |_| 1.0, row),
-            None => self.model.add_element_rows(site, row),
+/// The finite elements around nodes, all but those whose stress is a partial stress.
+pub(super) fn own_elements<const D: usize>(model: &Model<D>) -> Term<'_, D> {
+    Term::Rows(Box::new(|site, row| {
+        if model.point_of(site).is_none() {
+            model.add_element_rows(site, row);
         }
-    }
-
-    fn is_body_row(&self, site: usize) -> bool {
-        self.model.point_of(site).is_some()
-    }
-
-    fn counts_materials(&self) -> bool {
-        true
-    }
-
-    fn mixed_rows(&self) -> Option<&dyn MixedRows<D>> {
-        None
-    }
-
-    fn seam_bonds(&self) -> Option<SeamBonds<'_, D>> {
-        None
-    }
-
-    fn exact_stresses(&self) -> Option<ExactStresses<D>> {
-        None
-    }
-
-    fn beta(&self, site: usize) -> f64 {
-        f64::from(u8::from(self.model.point_of(site).is_some()))
-    }
-
-    fn definiteness(&self) -> Definiteness {
-        Definiteness::SumOfSquares
-    }
-
-    fn additional_bonds(&self) -> usize {
-        0
-    }
-
-    fn cell_stresses(&self) -> Option<&dyn CellStresses<D>> {
-        None
-    }
+    }))
 }

@@ -184,7 +184,7 @@ impl OutputCost {
     #[expect(clippy::too_many_arguments, reason = "each is another part of the run")]
     fn of<const D: usize>(
         model: &Model<D>,
-        operator: &dyn Operator<D>,
+        operator: &Operator<'_, D>,
         rest: &RunSettings<D>,
         impact: Option<Arc<Impact<D>>>,
         breaks: Breaks,

@@ -116,13 +116,13 @@ fn shares<const D: usize>(
                 ..LayoutStart::default()
             };
             let (coupling, choices) = (coupling.as_ref(), &mut Vec::new());
-            let operator = operator.as_ref();
+            let operator = &operator;
             let moving = dynamic(&model, coupling, operator, &rest, start, choices, progress)?;
             Some(moving.system)
         }
         false => None,
     };
-    let pattern = model.pattern(operator.as_ref(), &[], progress);
+    let pattern = model.pattern(&operator, &[], progress);
     if spreading == Spreading::Rows {
         spreading = of_statics(&model, coupling.as_ref(), &pattern, rest.solver.method);
     }

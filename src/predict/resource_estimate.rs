@@ -134,14 +134,14 @@ pub(crate) fn predict<const D: usize>(
     watch.lap(&mut timings, "sites and bonds");
     let laid_out = resident_memory_bytes().unwrap_or(0);
     let layout_peak = peak_memory_bytes().unwrap_or(0);
-    let pattern = affine_pattern(&model, operator.as_ref(), progress);
+    let pattern = affine_pattern(&model, &operator, progress);
     watch.lap(&mut timings, "assembly");
     loads::loads(&model, &rest.conditions, 0.0)?;
     let free = free_dofs(&model, &rest)?;
     let proof = proved(
         &model,
         coupling.as_ref(),
-        operator.as_ref(),
+        &operator,
         &rest,
         &pattern,
         progress,
@@ -155,7 +155,7 @@ pub(crate) fn predict<const D: usize>(
     watch.lap(&mut timings, "conditions and ordering");
     progress.finish();
 
-    let sizes = sizes_of(&model, operator.as_ref(), [nodes, cells], nonzeros);
+    let sizes = sizes_of(&model, &operator, [nodes, cells], nonzeros);
     choices.extend(solver_decisions(
         &model,
         &rest,
@@ -167,10 +167,7 @@ pub(crate) fn predict<const D: usize>(
 
     let (memory, peak) = plan.memory(laid_out, &sizes, &rest.output);
     plan.add_seconds(symmetry, nonzeros, &mut timings);
-    timings.add(
-        "output",
-        seconds_of_output(&model, operator.as_ref(), &rest)?,
-    );
+    timings.add("output", seconds_of_output(&model, &operator, &rest)?);
     let mut prediction = Prediction {
         scene: title,
         counted: None,
@@ -204,7 +201,7 @@ pub(crate) fn predict<const D: usize>(
 /// Sizes of a model that is laid out, of a mesh of so many nodes and cells.
 fn sizes_of<const D: usize>(
     model: &Model<D>,
-    operator: &dyn Operator<D>,
+    operator: &Operator<'_, D>,
     [nodes, cells]: [usize; 2],
     nonzeros: usize,
 ) -> Sizes {
@@ -252,7 +249,7 @@ fn weights_decisions<const D: usize>(model: &Model<D>) -> Vec<Decision> {
 /// [`RunError`] if it cannot be written.
 fn seconds_of_output<const D: usize>(
     model: &Model<D>,
-    operator: &dyn Operator<D>,
+    operator: &Operator<'_, D>,
     rest: &RunSettings<D>,
 ) -> Result<f64, RunError> {
     let zones = solution::zone_of_site(model);
@@ -278,7 +275,7 @@ fn seconds_of_output<const D: usize>(
 fn proved<const D: usize>(
     model: &Model<D>,
     coupling: &dyn Coupling<D>,
-    operator: &dyn Operator<D>,
+    operator: &Operator<'_, D>,
     rest: &RunSettings<D>,
     pattern: &Pattern,
     progress: &dyn Progress,
@@ -304,7 +301,7 @@ fn proved<const D: usize>(
 /// The pattern of the stiffness, with the forces of affine fields.
 fn affine_pattern<const D: usize>(
     model: &Model<D>,
-    operator: &dyn Operator<D>,
+    operator: &Operator<'_, D>,
     progress: &dyn Progress,
 ) -> Pattern {
     let fields = proof::affine_displacements(model);

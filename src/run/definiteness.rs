@@ -25,12 +25,12 @@ const SHIFT: f64 = 1e-10;
 /// # Errors
 /// [`RunError::Indefinite`] if the matrix has a negative eigenvalue, or is too large to be factorised.
 pub(crate) fn check<const D: usize>(
-    (model, operator, ranks): (&Model<D>, &dyn Operator<D>, Option<&dyn Ranks>),
+    (model, operator, ranks): (&Model<D>, &Operator<'_, D>, Option<&dyn Ranks>),
     ratio: Ratio,
     choices: &mut Vec<Decision>,
     progress: &dyn Progress,
 ) -> Result<(), RunError> {
-    if operator.definiteness() != Definiteness::NegativeTerms {
+    if operator.definiteness != Definiteness::NegativeTerms {
         return Ok(());
     }
     let refused = |what: String| RunError::Indefinite {
@@ -73,7 +73,7 @@ pub(crate) enum Open {
 
 /// Factorises the matrix at rest of all sites, none of them held, if that takes at most so many operations. Every process does, also where families are spread over `ranks`.
 pub(crate) fn factorised<const D: usize>(
-    (model, operator, ranks): (&Model<D>, &dyn Operator<D>, Option<&dyn Ranks>),
+    (model, operator, ranks): (&Model<D>, &Operator<'_, D>, Option<&dyn Ranks>),
     most_flops: f64,
     progress: &dyn Progress,
 ) -> Result<(), Open> {

@@ -35,7 +35,7 @@ use crate::{
 pub(crate) struct StaticInput<'a, const D: usize> {
     pub model: &'a Model<D>,
     pub coupling: &'a dyn Coupling<D>,
-    pub operator: &'a dyn Operator<D>,
+    pub operator: &'a Operator<'a, D>,
     pub conditions: &'a [Condition<D>],
     pub solver: &'a Solver,
     /// The time at which conditions are taken.

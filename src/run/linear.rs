@@ -50,7 +50,7 @@ impl<const D: usize> SceneModel<D> {
     /// [`RunError::Model`] of the coupling.
     pub fn stiffness(&self) -> Result<BlockCsr, RunError> {
         let operator = self.coupling.operator(&self.model)?;
-        Ok(self.model.assemble(operator.as_ref(), &Silent))
+        Ok(self.model.assemble(&operator, &Silent))
     }
 
     /// Stiffness, and lumped mass of each site \[kg\].
@@ -59,10 +59,10 @@ impl<const D: usize> SceneModel<D> {
     /// As [`SceneModel::stiffness`].
     pub fn motion(&self) -> Result<LinearMotion, RunError> {
         let operator = self.coupling.operator(&self.model)?;
-        Ok(self.motion_by(operator.as_ref()))
+        Ok(self.motion_by(&operator))
     }
 
-    fn motion_by(&self, operator: &dyn Operator<D>) -> LinearMotion {
+    fn motion_by(&self, operator: &Operator<'_, D>) -> LinearMotion {
         LinearMotion {
             stiffness: self.model.assemble(operator, &Silent),
             mass: masses(&self.model, |material| self.density[material as usize]),
@@ -100,8 +100,8 @@ fn linear_model<const D: usize>(scene: Scene<D>) -> Result<LinearModel, RunError
     let operator = laid.coupling.operator(&laid.model)?;
     let sites = &laid.model.sites;
     Ok(LinearModel {
-        beta: (0..sites.len()).map(|s| operator.beta(s)).collect(),
+        beta: (0..sites.len()).map(|s| (operator.beta)(s)).collect(),
         position: sites.iter().map(|s| padded(&s.position)).collect(),
-        motion: laid.motion_by(operator.as_ref()),
+        motion: laid.motion_by(&operator),
     })
 }

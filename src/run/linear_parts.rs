@@ -89,7 +89,7 @@ impl<'m, const D: usize> LinearParts<'m, D> {
     /// [`RunError::Fracture`] for a fracture energy that gives no stretch.
     pub fn new(
         model: &'m Model<D>,
-        operator: &dyn Operator<D>,
+        operator: &Operator<'_, D>,
         rest: &'m RunSettings<D>,
         (kind, is_exact_seam): (RunKind, bool),
         ranks: Option<&'m dyn Ranks>,
@@ -135,7 +135,7 @@ impl<'m, const D: usize> LinearParts<'m, D> {
         }
     }
 
-    fn find_points(&mut self, operator: &dyn Operator<D>, is_exact_seam: bool) {
+    fn find_points(&mut self, operator: &Operator<'_, D>, is_exact_seam: bool) {
         let (model, rest) = (self.model, self.rest);
         let breaks = self.critical.is_some();
         for (site, s) in model.sites.iter().enumerate() {

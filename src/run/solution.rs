@@ -24,7 +24,7 @@ pub struct Solved<'a, const D: usize> {
     /// The model.
     pub model: &'a Model<D>,
     /// Its rows.
-    pub operator: &'a dyn Operator<D>,
+    pub operator: &'a Operator<'a, D>,
     /// Displacement, `D` numbers per site.
     pub displacement: &'a [f64],
     /// Residual `K u − f` of each dof; on prescribed dofs the reaction.

@@ -129,14 +129,14 @@ fn solve_chosen<const D: usize>(
     watch.lap(&mut timings, "sites and bonds");
     let operator = coupling.operator(model)?;
     let mut choices: Vec<Decision> = rest.made().cloned().collect();
-    let rows = (model, operator.as_ref(), ranks);
+    let rows = (model, &operator, ranks);
     definiteness::check(rows, rest.ratio, &mut choices, progress)?;
     watch.lap(&mut timings, "assembly");
-    let mut system = motion::dynamic_system::still(model, coupling, operator.as_ref(), &rest)?;
+    let mut system = motion::dynamic_system::still(model, coupling, &operator, &rest)?;
     let body = StaticBody {
         model,
         coupling,
-        operator: operator.as_ref(),
+        operator: &operator,
         rest: &rest,
         ranks,
         has_exact_seam: system.as_ref().is_some_and(CoupledSystem::has_seam_bonds),
@@ -159,7 +159,7 @@ fn solve_chosen<const D: usize>(
     let sections = body.section_forces(&residual, &equilibrium.solution.displacement)?;
     let solved = Solved {
         model,
-        operator: operator.as_ref(),
+        operator: &operator,
         displacement: &equilibrium.solution.displacement,
         residual: &residual,
         zone_of_site: &zone_of_site(model),
@@ -202,7 +202,7 @@ fn laid_out<const D: usize>(
 struct StaticBody<'a, const D: usize> {
     model: &'a Model<D>,
     coupling: &'a dyn Coupling<D>,
-    operator: &'a dyn Operator<D>,
+    operator: &'a Operator<'a, D>,
     rest: &'a RunSettings<D>,
     ranks: Option<&'a dyn Ranks>,
     /// True if bonds of the seam are geometrically exact like others.

@@ -108,8 +108,7 @@ impl<const D: usize> Solved<'_, D> {
         if let Some(told) = told {
             return self.complete(told.tensor(), told.across, material, &x);
         }
-        let of_bonds = self.operator.cell_stresses();
-        let own = |u: &[f64]| of_bonds.and_then(|stresses| stresses.cell_stress(c, u));
+        let own = |u: &[f64]| self.operator.cell_stress(c, u);
         let tensor = match own(self.displacement) {
             Some(stress) => {
                 let of = |u: &[f64]| own(u).unwrap_or_else(Tensor::zeros);

@@ -178,7 +178,7 @@ impl<const D: usize> Thermal<D> {
     pub fn rows<'r>(
         &self,
         model: &Model<D>,
-        operator: &dyn Operator<D>,
+        operator: &Operator<'_, D>,
         own: Option<&[u32]>,
         knows_temperature: bool,
         alike: impl FnOnce() -> Cow<'r, BlockCsr>,
@@ -190,7 +190,7 @@ impl<const D: usize> Thermal<D> {
         if materials.iter().all(|&m| alpha(m) == alpha(first)) {
             return Ok(ExpandingRows(vec![(alpha(first), alike())]));
         }
-        if !operator.counts_materials() {
+        if !operator.counts_materials {
             return Err(RunError::Later {
                 what: "materials that expand differently at the seam of this coupling, or among its points (in plane strain (1 + ν) α counts)",
                 remedy: "use coupling = \"splice\" or \"nonlocal\", or enclose the zone in elements of the material of its points",

@@ -83,7 +83,7 @@ fn with_motion_by<const D: usize, T>(
     let operator = coupling.operator(&enclosed.model).unwrap();
     let mut motion = CoupledSystem::new(
         &enclosed.model,
-        operator.as_ref(),
+        &operator,
         coupling.symmetry(),
         |_| DENSITY,
         behaviour,

@@ -272,7 +272,7 @@ fn bodies_of_different_horizons_break_at_their_own_stretch() {
             ..behaviour(BondKinematics::Exact, None)
         };
         let density = |_| DENSITY;
-        let (model, operator) = (&e.model, operator.as_ref());
+        let (model, operator) = (&e.model, &operator);
         let mut motion =
             CoupledSystem::new(model, operator, Symmetry::Symmetric, density, &behaviour).unwrap();
         let stretched = |strain: f64| -> Vec<f64> {
@@ -368,7 +368,7 @@ fn crack_beside_the_seam(coupling: &str) -> Run {
     };
     let mut motion = CoupledSystem::new(
         &e.model,
-        operator.as_ref(),
+        &operator,
         Symmetry::Symmetric,
         |_| DENSITY,
         &behaviour,

@@ -117,10 +117,10 @@ fn lay_out<T>(
     };
     let (problem, _) = setup::problem(scene.scene);
     let (model, coupling) = problem.lay_out(ranks, &Silent).expect("a model");
-    let operator: Box<dyn Operator<3> + '_> = coupling.operator(&model).expect("rows");
+    let operator: Operator<'_, 3> = coupling.operator(&model).expect("rows");
     let system = CoupledSystem::of_processes(
         &model,
-        operator.as_ref(),
+        &operator,
         coupling.symmetry(),
         |_| 1.0,
         &BondBehaviour {

@@ -222,9 +222,9 @@ impl<const D: usize> Enclosed<D> {
         } = scene::model(&case.text::<D>(otherwise), &files)?;
         let (stiffness, shared) = {
             let operator = coupling.operator(&model).map_err(SceneFailure::from)?;
-            let rows = |sites: &[u32]| model.assemble_sites_unscaled(operator.as_ref(), sites);
+            let rows = |sites: &[u32]| model.assemble_sites_unscaled(&operator, sites);
             match ranks {
-                None => (model.assemble_unscaled(operator.as_ref()), None),
+                None => (model.assemble_unscaled(&operator), None),
                 Some(ranks) => {
                     let partition = model
                         .distribute(ranks.count(), false, Some(ranks))

@@ -283,13 +283,7 @@ pub fn measured<const D: usize>(
         heat: None,
     };
     let symmetry = laid.coupling.symmetry();
-    let system = CoupledSystem::new(
-        &laid.model,
-        operator.as_ref(),
-        symmetry,
-        |_| 1.0,
-        &behaviour,
-    );
+    let system = CoupledSystem::new(&laid.model, &operator, symmetry, |_| 1.0, &behaviour);
     let laws = laid.model.local_laws(&laid.local_laws);
     let mut system = system
         .and_then(|system| system.with_local_laws(&laws))

@@ -82,7 +82,7 @@ fn contact_of<const D: usize>(
 impl<const D: usize> MovingBody<D> {
     pub fn new(
         model: &Model<D>,
-        operator: &dyn Operator<D>,
+        operator: &Operator<'_, D>,
         behaviour: &BondBehaviour<'_, D>,
         seam: Option<&NonlinearSeam<D>>,
         ranks: Option<&dyn Ranks>,

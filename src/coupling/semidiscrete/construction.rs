@@ -4,7 +4,7 @@ use super::CoupledSystem;
 use super::behaviour::{BondBehaviour, SystemError};
 use crate::{
     coupling::{
-        ExactStresses, NonlinearSeam, Operator,
+        ExactStresses, NonlinearSeam, Operator, Term,
         semidiscrete::{
             body::MovingBody, elements::LocalElements, energy::ElementEnergy, masses,
             rows::SiteRows,
@@ -31,7 +31,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
     /// [`crate::system::LinearMotion`] instead.
     pub fn new(
         model: &'a Model<D>,
-        operator: &dyn Operator<D>,
+        operator: &Operator<'_, D>,
         symmetry: Symmetry,
         density: impl Fn(u16) -> f64 + Sync,
         behaviour: &BondBehaviour<'_, D>,
@@ -45,7 +45,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
     /// As [`CoupledSystem::new`].
     pub fn of_processes(
         model: &'a Model<D>,
-        operator: &dyn Operator<D>,
+        operator: &Operator<'_, D>,
         symmetry: Symmetry,
         density: impl Fn(u16) -> f64 + Sync,
         behaviour: &BondBehaviour<'_, D>,
@@ -59,11 +59,18 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
         // the pieces of bonds that a seam cuts follow the laws that have accelerators; of any other they stay linear, as where they expand or a state breaks bonds
         let follows = behaviour.suits_accelerators()
             && (model.peridynamics.as_ref()).is_some_and(|p| p.accelerator().is_some());
-        let of_seam = (!is_linear && follows).then(|| operator.seam_bonds());
-        let (mut seam, add_rest) = match of_seam.flatten() {
-            Some(of_seam) => (Some(of_seam.bonds), Some(of_seam.add_rest)),
-            None => (None, None),
-        };
+        let (mut seam, mut stresses) = (None, None);
+        for term in &operator.terms {
+            match term {
+                Term::SeamBonds(bonds) if !is_linear && follows => seam = Some((bonds.in_motion)()),
+                Term::Stresses(term)
+                    if behaviour.kinematics == BondKinematics::Exact && model.follows_bonds() =>
+                {
+                    stresses = ExactStresses::new(term);
+                }
+                Term::Rows(_) | Term::Bonds(_) | Term::SeamBonds(_) | Term::Stresses(_) => {}
+            }
+        }
         let body = MovingBody::new(model, operator, behaviour, seam.as_ref(), ranks)?;
         if let (Some(seam), Some(body)) = (&mut seam, model.body()) {
             let cloud = &body.cloud;
@@ -78,20 +85,14 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
                 seam.let_break(model, body, critical, never);
             }
         }
-        let mixed = operator.mixed_rows();
+        let is_exact_seam = seam.is_some();
         let linear = SiteRows::assemble(
             sites,
-            |site| match seam {
-                Some(_) => model.point_of(site).is_none(),
-                None => !operator.is_body_row(site),
+            |site| match is_exact_seam {
+                true => model.point_of(site).is_none(),
+                false => !operator.is_body_row(site),
             },
-            |site, row| match (&add_rest, mixed) {
-                (Some(add_rest), _) => add_rest(site, row),
-                (None, Some(mixed)) if mixed.has_body_bonds(site) => {
-                    mixed.add_row_beside_bonds(site, row);
-                }
-                _ => operator.add_row(site, row),
-            },
+            |site, row| operator.add_row_beside_bonds(site, is_exact_seam, row),
         );
         let mass = masses(model, density);
         let energy = ElementEnergy::new(model);
@@ -108,10 +109,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
             products: Vec::new(),
             body,
             seam,
-            stresses: match behaviour.kinematics {
-                BondKinematics::Exact if model.follows_bonds() => operator.exact_stresses(),
-                _ => None,
-            },
+            stresses,
             energy,
             elements: None,
             heat: behaviour.heat.clone(),

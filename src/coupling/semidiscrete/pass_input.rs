@@ -3,7 +3,7 @@
 use crate::model::Model;
 use crate::{
     coupling::{
-        NonlinearSeam, Operator,
+        BondsOfSite, NonlinearSeam, Operator,
         semidiscrete::behaviour::{BondBehaviour, BondThreshold, NONE, SystemError},
     },
     model::SiteKind,
@@ -150,15 +150,14 @@ impl<'a> Holders<'a> {
 /// The traversed families, where rows keep some bonds of their points to themselves.
 pub(super) fn passed_families<const D: usize>(
     model: &Model<D>,
-    operator: &dyn Operator<D>,
+    operator: &Operator<'_, D>,
     body: &PdBody<D>,
     own_row: &[bool],
 ) -> Option<Families> {
-    let mixed = operator.mixed_rows()?;
-    let has_bonds = |site: usize| mixed.has_body_bonds(site);
+    let has_bonds = |site: usize| operator.bonds_of_site(site) == BondsOfSite::Among;
     (0..model.sites.len()).any(has_bonds).then(|| {
         let mut passed = body.families.clone();
-        passed.retain_of(|i| !own_row[i], |i, j| mixed.is_body_bond(i, j as usize));
+        passed.retain_of(|i| !own_row[i], |i, j| operator.holds_bond(i, j as usize));
         passed.mirrored(&model.points.feet)
     })
 }
@@ -196,20 +195,19 @@ pub(super) struct PointSites {
 impl PointSites {
     pub fn of<const D: usize>(
         model: &Model<D>,
-        operator: &dyn Operator<D>,
+        operator: &Operator<'_, D>,
         points: usize,
         is_seam: bool,
     ) -> Self {
         let mut site_of_point = vec![NONE; points];
         let mut bonds_of_site = vec![NONE; model.sites.len()];
         let mut own_row = vec![false; points];
-        let mixed = operator.mixed_rows();
         for (site, s) in model.sites.iter().enumerate() {
             if let SiteKind::Point(point) = s.kind {
                 site_of_point[point as usize] = site as u32;
-                let is_own = is_seam || operator.is_body_row(site);
-                own_row[point as usize] = is_own;
-                if is_own || mixed.is_some_and(|mixed| mixed.has_body_bonds(site)) {
+                let bonds = operator.bonds_of_site(site);
+                own_row[point as usize] = is_seam || bonds == BondsOfSite::Alone;
+                if is_seam || bonds != BondsOfSite::None {
                     bonds_of_site[site] = point;
                 }
             }

@@ -50,6 +50,8 @@ pub use self::{affine_fit::SeamConditions, nonlinear_bonds::NonlinearSeam};
 
 use std::sync::Arc;
 
+use rustc_hash::FxHashSet;
+
 use self::{bond_segments::Segments, corner_correction::EdgeCorrection, dilatation::Dilatations};
 use crate::coupling::truncated::{
     lps_constants::LpsConstants,
@@ -57,7 +59,7 @@ use crate::coupling::truncated::{
 };
 use crate::{
     assembly::Row,
-    coupling::{CellStresses, Definiteness, ExactStresses, MixedRows, Operator, SeamBonds},
+    coupling::{BodyBonds, BondsOfSite, Definiteness, Operator, SeamBonds, Term},
     mesh::Mesh,
     model::{
         CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout,
@@ -129,21 +131,13 @@ impl<const D: usize> ZoneLayout<D> for Truncated {
 coupling_by_rows!(Truncated);
 
 impl Truncated {
-    fn rows<'a, const D: usize>(
-        &self,
-        model: &'a Model<D>,
-    ) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
+    fn rows<'a, const D: usize>(&self, model: &'a Model<D>) -> Result<Operator<'a, D>, ModelError> {
         let (Some(body), Some(passing)) = (model.body(), model.passing()) else {
             return Ok(super::uncoupled::own_model(model));
         };
         let known = model.operator_cache.get();
         if let Some(pieces) = known.and_then(|known| known.downcast_ref::<Arc<Pieces<D>>>()) {
-            return Ok(Box::new(TruncatedRows {
-                model,
-                states: None,
-                cut_bonds: self.cut_bonds,
-                pieces: Arc::clone(pieces),
-            }));
+            return Ok(self.terms(model, None, pieces));
         }
         let mut segments = Segments::new(model, body, passing);
         let mut strings = EdgeCorrection::new(&segments);
@@ -173,12 +167,14 @@ impl Truncated {
             Some(_) if has_two => springs.is_positive(),
             _ => springs.is_positive() && dilatations.is_positive(),
         };
+        let broken = segments.broken.clone();
         let (whole, states) = match common {
             None => (Some(WholeBonds::of(segments)), None),
             Some(common) => (None, Some((segments, common))),
         };
         let pieces = Arc::new(Pieces {
             whole,
+            broken,
             squares,
             has_two_dilatations: has_two,
             strings,
@@ -190,12 +186,96 @@ impl Truncated {
             // one that is there already says the same
             let _ = model.operator_cache.set(Box::new(Arc::clone(&pieces)));
         }
-        Ok(Box::new(TruncatedRows {
+        Ok(self.terms(model, states, &pieces))
+    }
+
+    /// Finite elements outside of the zone, the whole bonds of the body, the strings of edges, and the pieces of bonds with their dilatations.
+    fn terms<'a, const D: usize>(
+        &self,
+        model: &'a Model<D>,
+        states: Option<States<'a, D>>,
+        pieces: &Arc<Pieces<D>>,
+    ) -> Operator<'a, D> {
+        let is_node = |site: usize| model.point_of(site).is_none();
+        let of_nodes = Arc::clone(pieces);
+        Operator {
             model,
-            states,
-            cut_bonds: self.cut_bonds,
-            pieces,
-        }))
+            terms: vec![
+                Term::Rows(Box::new(move |site, row| {
+                    if is_node(site) {
+                        model.add_rows_of_own_elements(site, row);
+                        of_nodes.strings.add_row(site, row);
+                    }
+                })),
+                Term::Bonds(body_bonds(model, pieces)),
+                self.of_seam(model, states, pieces),
+            ],
+            beta: Box::new(move |site| f64::from(u8::from(!is_node(site)))),
+            counts_materials: false,
+            definiteness: pieces.definiteness(),
+        }
+    }
+
+    /// The bonds that the seam cuts: rows, or what turns, stretches and breaks.
+    fn of_seam<'a, const D: usize>(
+        &self,
+        model: &'a Model<D>,
+        states: Option<States<'a, D>>,
+        pieces: &Arc<Pieces<D>>,
+    ) -> Term<'a, D> {
+        let of_rows = Arc::clone(pieces);
+        let add_row = Box::new(move |site: usize, row: &mut Row<D>| {
+            let point = model.point_of(site).map(|(_, i)| i);
+            if point.is_none_or(|i| of_rows.listed[i]) {
+                of_rows.springs.add_row(site, row);
+                of_rows.dilatations.add_row(site, row);
+            }
+        });
+        // what follows the motion has one dilatation
+        let may_move = self.cut_bonds == CutBonds::Breaking && !pieces.has_two_dilatations;
+        let Some(body) = model.body().filter(|_| may_move) else {
+            return Term::Rows(add_row);
+        };
+        let [of_motion, beside] = [Arc::clone(pieces), Arc::clone(pieces)];
+        Term::SeamBonds(SeamBonds {
+            add_row,
+            in_motion: Box::new(move || {
+                let states = states.as_ref().map(|(segments, common)| (segments, common));
+                let Pieces {
+                    springs, broken, ..
+                } = &*of_motion;
+                NonlinearSeam::new(model, body, springs, broken, states)
+            }),
+            // the elements behind the seam have other dilatations, with the bonds
+            add_beside: Box::new(move |site, row| {
+                if model.point_of(site).is_none() {
+                    beside.dilatations.take_back(site, row);
+                }
+            }),
+        })
+    }
+}
+
+/// The bonds of the points at the seam, of a law whose bonds share dilatations.
+type States<'a, const D: usize> = (Segments<'a, D>, LpsConstants);
+
+/// The bonds of the body: all of points away from the seam, the whole ones of points at the seam of a pairwise law.
+fn body_bonds<'a, const D: usize>(
+    model: &'a Model<D>,
+    pieces: &Arc<Pieces<D>>,
+) -> BodyBonds<'a, D> {
+    let [at, holds] = [Arc::clone(pieces), Arc::clone(pieces)];
+    BodyBonds {
+        at: Box::new(move |site| match model.point_of(site) {
+            Some((_, i)) if !at.listed[i] => BondsOfSite::Alone,
+            // the dilatations of an LPS differ from the body's
+            Some(_) if at.whole.is_some() => BondsOfSite::Among,
+            _ => BondsOfSite::None,
+        }),
+        holds: Box::new(move |i, j| {
+            (holds.whole.as_ref()).is_none_or(|whole| whole.contains(i, j))
+        }),
+        feet: Vec::new(),
     }
 }
 
@@ -208,18 +288,12 @@ pub fn seam_conditions<const D: usize>(model: &Model<D>) -> Option<SeamCondition
     Some(affine_fit::conditions(&mut segments))
 }
 
-struct TruncatedRows<'a, const D: usize> {
-    model: &'a Model<D>,
-    /// The bonds of the points at the seam, of a law whose bonds share dilatations.
-    states: Option<(Segments<'a, D>, LpsConstants)>,
-    cut_bonds: CutBonds,
-    pieces: Arc<Pieces<D>>,
-}
-
 /// Decomposition of the bonds of the points at the seam.
 struct Pieces<const D: usize> {
     /// Those of a pairwise law that are whole, and the body's; the others are springs. With dilatations all are springs.
     whole: Option<WholeBonds>,
+    /// Bonds between points of the zone that are not whole, lower number first.
+    broken: FxHashSet<(u32, u32)>,
     springs: Springs<D>,
     dilatations: Dilatations<D>,
     strings: EdgeCorrection<D>,
@@ -231,113 +305,13 @@ struct Pieces<const D: usize> {
     has_two_dilatations: bool,
 }
 
-impl<const D: usize> Operator<D> for TruncatedRows<'_, D> {
-    fn add_row(&self, site: usize, row: &mut Row<D>) {
-        match self.model.point_of(site) {
-            Some((body, i)) if !self.pieces.listed[i] => {
-                body.add_force_row(i, |_| 1.0, row);
-                return;
-            }
-            Some((body, i)) => {
-                if let Some(whole) = &self.pieces.whole {
-                    body.add_force_row(i, |j| f64::from(whole.contains(i, j)), row);
-                }
-            }
-            None => {
-                self.model.add_rows_of_own_elements(site, row);
-                self.pieces.strings.add_row(site, row);
-            }
-        }
-        self.pieces.springs.add_row(site, row);
-        self.pieces.dilatations.add_row(site, row);
-    }
-
-    fn counts_materials(&self) -> bool {
-        false
-    }
-
-    fn is_body_row(&self, site: usize) -> bool {
-        self.model
-            .point_of(site)
-            .is_some_and(|(_, i)| !self.pieces.listed[i])
-    }
-
-    fn mixed_rows(&self) -> Option<&dyn MixedRows<D>> {
-        Some(self)
-    }
-
-    fn exact_stresses(&self) -> Option<ExactStresses<D>> {
-        None
-    }
-
+impl<const D: usize> Pieces<D> {
     fn definiteness(&self) -> Definiteness {
-        let is_plain = self.pieces.strings.is_empty() && !self.pieces.has_two_dilatations;
-        match (self.pieces.squares, is_plain) {
+        let is_plain = self.strings.is_empty() && !self.has_two_dilatations;
+        match (self.squares, is_plain) {
             (true, true) => Definiteness::SumOfSquares,
             (true, false) => Definiteness::EdgeTerms,
             (false, _) => Definiteness::NegativeTerms,
-        }
-    }
-
-    fn seam_bonds(&self) -> Option<SeamBonds<'_, D>> {
-        // what follows the motion has one dilatation
-        if self.cut_bonds == CutBonds::Linear || self.pieces.has_two_dilatations {
-            return None;
-        }
-        let states = self.states.as_ref();
-        let broken = match (&self.pieces.whole, states) {
-            (Some(whole), _) => &whole.broken,
-            (None, Some((segments, _))) => &segments.broken,
-            (None, None) => return None,
-        };
-        let bonds = NonlinearSeam::new(
-            self.model,
-            self.model.body()?,
-            &self.pieces.springs,
-            broken,
-            states.map(|(segments, common)| (segments, common)),
-        );
-        Some(SeamBonds {
-            bonds,
-            add_rest: Box::new(|site, row| {
-                if self.model.point_of(site).is_none() {
-                    self.model.add_rows_of_own_elements(site, row);
-                    self.pieces.strings.add_row(site, row);
-                    // the elements behind the seam have other dilatations, with the bonds
-                    self.pieces.dilatations.take_back(site, row);
-                }
-            }),
-        })
-    }
-
-    fn beta(&self, site: usize) -> f64 {
-        f64::from(u8::from(self.model.point_of(site).is_some()))
-    }
-
-    fn additional_bonds(&self) -> usize {
-        0
-    }
-
-    fn cell_stresses(&self) -> Option<&dyn CellStresses<D>> {
-        None
-    }
-}
-
-impl<const D: usize> MixedRows<D> for TruncatedRows<'_, D> {
-    fn has_body_bonds(&self, site: usize) -> bool {
-        // the dilatations of an LPS differ from the body's
-        let alone = self.pieces.whole.is_some();
-        alone && self.model.point_of(site).is_some() && !self.is_body_row(site)
-    }
-
-    fn is_body_bond(&self, i: usize, j: usize) -> bool {
-        let whole = self.pieces.whole.as_ref();
-        whole.is_none_or(|whole| whole.contains(i, j))
-    }
-
-    fn add_row_beside_bonds(&self, site: usize, row: &mut Row<D>) {
-        if self.has_body_bonds(site) {
-            self.pieces.springs.add_row(site, row);
         }
     }
 }

@@ -1,11 +1,10 @@
 //! The rows of truncated families: gradients of an energy.
 
-use crate::assembly::Row;
 use crate::mesh::Mesh;
 use crate::peridynamics::LinearForceState;
 use crate::system::Symmetry;
 use crate::{
-    coupling::{CellStresses, Definiteness, ExactStresses, MixedRows, Operator, SeamBonds},
+    coupling::{BodyBonds, BondsOfSite, Definiteness, Operator, Term, uncoupled::own_elements},
     model::{CellRole, Interface, Model, ModelError, Reach, Zone, ZoneLayout},
 };
 
@@ -44,87 +43,29 @@ impl<const D: usize> ZoneLayout<D> for TruncatedFamilies {
 coupling_by_rows!(TruncatedFamilies);
 
 impl TruncatedFamilies {
-    fn rows<'a, const D: usize>(
-        &self,
-        model: &'a Model<D>,
-    ) -> Result<Box<dyn Operator<D> + 'a>, ModelError> {
-        Ok(Box::new(FamilyRows {
+    fn rows<'a, const D: usize>(&self, model: &'a Model<D>) -> Result<Operator<'a, D>, ModelError> {
+        let feet = model.feet_of_sites();
+        let is_point = |site: usize| model.point_of(site).is_some();
+        let has_feet: Vec<bool> = feet.iter().map(|feet| !feet.is_empty()).collect();
+        let at = move |site: usize| match (is_point(site), has_feet[site]) {
+            (true, _) => BondsOfSite::Alone,
+            (false, true) => BondsOfSite::Among,
+            (false, false) => BondsOfSite::None,
+        };
+        Ok(Operator {
             model,
-            feet: model.feet_of_sites(),
-        }))
-    }
-}
-
-/// The rows: gradients of the energy.
-struct FamilyRows<'a, const D: usize> {
-    model: &'a Model<D>,
-    /// The feet that follow each site, with their weights.
-    feet: Vec<Vec<(u32, f64)>>,
-}
-
-impl<const D: usize> Operator<D> for FamilyRows<'_, D> {
-    fn add_row(&self, site: usize, row: &mut Row<D>) {
-        match self.model.point_of(site) {
-            Some((body, point)) => body.add_force_row(point, |_| 1.0, row),
-            None => {
-                self.model.add_element_rows(site, row);
-                if let Some(body) = self.model.body() {
-                    for &(foot, weight) in &self.feet[site] {
-                        body.add_force_row(foot as usize, |_| weight, row);
-                    }
-                }
-            }
-        }
-    }
-
-    fn counts_materials(&self) -> bool {
-        false
-    }
-
-    fn is_body_row(&self, site: usize) -> bool {
-        self.model.point_of(site).is_some()
-    }
-
-    fn mixed_rows(&self) -> Option<&dyn MixedRows<D>> {
-        Some(self)
-    }
-
-    fn seam_bonds(&self) -> Option<SeamBonds<'_, D>> {
-        None
-    }
-
-    fn exact_stresses(&self) -> Option<ExactStresses<D>> {
-        None
-    }
-
-    fn beta(&self, site: usize) -> f64 {
-        f64::from(u8::from(self.is_body_row(site)))
-    }
-
-    fn definiteness(&self) -> Definiteness {
-        Definiteness::SumOfSquares
-    }
-
-    fn additional_bonds(&self) -> usize {
-        0
-    }
-
-    fn cell_stresses(&self) -> Option<&dyn CellStresses<D>> {
-        None
-    }
-}
-
-impl<const D: usize> MixedRows<D> for FamilyRows<'_, D> {
-    fn has_body_bonds(&self, site: usize) -> bool {
-        !self.feet[site].is_empty()
-    }
-
-    fn is_body_bond(&self, _i: usize, _j: usize) -> bool {
-        true
-    }
-
-    fn add_row_beside_bonds(&self, site: usize, row: &mut Row<D>) {
-        self.model.add_element_rows(site, row);
+            terms: vec![
+                own_elements(model),
+                Term::Bonds(BodyBonds {
+                    at: Box::new(at),
+                    holds: Box::new(|_, _| true),
+                    feet,
+                }),
+            ],
+            beta: Box::new(move |site| f64::from(u8::from(is_point(site)))),
+            counts_materials: false,
+            definiteness: Definiteness::SumOfSquares,
+        })
     }
 }
 

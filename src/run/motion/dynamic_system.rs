@@ -62,7 +62,7 @@ pub(crate) struct LayoutStart<'a, const D: usize> {
 pub(crate) fn dynamic<'a, const D: usize>(
     model: &'a Model<D>,
     coupling: &dyn Coupling<D>,
-    operator: &dyn Operator<D>,
+    operator: &Operator<'_, D>,
     rest: &RunSettings<D>,
     start: LayoutStart<'a, D>,
     choices: &mut Vec<Decision>,
@@ -109,7 +109,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
             let motion = sharing_steps(motion.with_ranks(start.ranks), start.sharing);
             if failure.is_some()
                 && motion.has_seam_bonds()
-                && operator.definiteness() == Definiteness::NegativeTerms
+                && operator.definiteness == Definiteness::NegativeTerms
             {
                 return Err(RunError::Indefinite {
                     what: "bonds that break at the seam may bring that forth at any time; cut-bonds = \"linear\" in [coupling.truncated] keeps them whole".to_owned(),
@@ -340,7 +340,7 @@ fn tell_bonds<const D: usize>(
 fn assembled<'a, const D: usize>(
     model: &'a Model<D>,
     coupling: &dyn Coupling<D>,
-    operator: &dyn Operator<D>,
+    operator: &Operator<'_, D>,
     rest: &RunSettings<D>,
     error: &SystemError,
     choices: &mut Vec<Decision>,
@@ -372,7 +372,7 @@ fn assembled<'a, const D: usize>(
 pub(crate) fn still<'a, const D: usize>(
     model: &'a Model<D>,
     coupling: &dyn Coupling<D>,
-    operator: &dyn Operator<D>,
+    operator: &Operator<'_, D>,
     rest: &RunSettings<D>,
 ) -> Result<Option<CoupledSystem<'a, D>>, RunError> {
     let kinematics = rest.kinematics();

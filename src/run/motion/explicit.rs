@@ -35,7 +35,7 @@ use crate::{
 };
 
 /// The sizes of a model that moves.
-pub fn sizes<const D: usize>(model: &Model<D>, operator: &dyn Operator<D>) -> Sizes {
+pub fn sizes<const D: usize>(model: &Model<D>, operator: &Operator<'_, D>) -> Sizes {
     Sizes {
         nodes: model.mesh.nodes.len(),
         cells: model.mesh.cell_count(),

@@ -78,7 +78,7 @@ pub(crate) struct StepState<'r, 'm, const D: usize> {
 /// A layout before its first step, and the record of it.
 pub(crate) struct PreStep<'a, 'r, 'm, const D: usize> {
     pub model: &'m Model<D>,
-    pub operator: &'a dyn Operator<D>,
+    pub operator: &'a Operator<'a, D>,
     pub rest: &'r RunSettings<D>,
     pub spec: &'a Spec,
     pub moving: DynamicSystem<'m>,

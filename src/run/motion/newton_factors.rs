@@ -21,7 +21,7 @@ pub(super) const RAISED: f64 = 1e-10;
 
 /// The stiffness before bonds break, with its diagonal raised.
 fn raised<const D: usize>(
-    (model, operator, terms): (&Model<D>, &dyn Operator<D>, &ConditionTerms),
+    (model, operator, terms): (&Model<D>, &Operator<'_, D>, &ConditionTerms),
     progress: &dyn Progress,
 ) -> BlockCsr {
     let mut stiffness = model.assemble(operator, progress);
@@ -43,7 +43,7 @@ impl CoarsenedStiffness {
     /// # Errors
     /// [`RunError`] for supports that meet no site.
     pub fn new<const D: usize>(
-        body: (&Model<D>, &dyn Operator<D>, &ConditionTerms),
+        body: (&Model<D>, &Operator<'_, D>, &ConditionTerms),
         symmetry: Symmetry,
         rest: &RunSettings<D>,
         choices: &mut Vec<Decision>,
@@ -89,7 +89,7 @@ impl NewtonFactors {
     /// # Errors
     /// [`RunError`] for supports that meet no site, and for factors that are asked for and do not fit.
     pub fn new<const D: usize>(
-        (model, operator, terms): (&Model<D>, &dyn Operator<D>, &ConditionTerms),
+        (model, operator, terms): (&Model<D>, &Operator<'_, D>, &ConditionTerms),
         symmetry: Symmetry,
         rest: &RunSettings<D>,
         choices: &mut Vec<Decision>,

@@ -36,7 +36,7 @@ pub struct ModelSetup<'a, const D: usize> {
     /// Sites, families and zones.
     pub model: &'a Model<D>,
     /// Rows of the stiffness.
-    pub operator: &'a dyn Operator<D>,
+    pub operator: &'a Operator<'a, D>,
     /// Settings that the run keeps of the scene.
     pub rest: &'a RunSettings<D>,
     /// The system that solvers see, with its properties.
@@ -114,7 +114,7 @@ pub(crate) fn lay_out<const D: usize, T>(
     let mut moving = dynamic(
         &model,
         coupling.as_ref(),
-        operator.as_ref(),
+        &operator,
         rest,
         start,
         &mut choices,
@@ -122,13 +122,13 @@ pub(crate) fn lay_out<const D: usize, T>(
     )?;
     choices.extend(without_balance(&model, rest, moving.is_linear));
     let of = (start.ranks, moving.system.as_ref());
-    let proved = growth::proved(&model, operator.as_ref(), of, progress);
+    let proved = growth::proved(&model, &operator, of, progress);
     watch.lap(&mut timings, "rows and bonds");
     let proof = proof::prove(
         &Subject {
             model: &model,
             coupling: coupling.as_ref(),
-            operator: operator.as_ref(),
+            operator: &operator,
             rest,
             stiffness: None,
             product: None,
@@ -149,7 +149,7 @@ pub(crate) fn lay_out<const D: usize, T>(
         remedy,
         proved,
         model: &model,
-        operator: operator.as_ref(),
+        operator: &operator,
         rest,
         moving,
         terms: Arc::clone(&terms),

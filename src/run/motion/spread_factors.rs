@@ -34,7 +34,7 @@ impl<'a> Leads<'a> {
     /// # Errors
     /// Those of [`NewtonFactors::new`] and [`SpreadStiffness::new`].
     pub fn new<const D: usize>(
-        (model, operator, terms): (&Model<D>, &dyn Operator<D>, &ConditionTerms),
+        (model, operator, terms): (&Model<D>, &Operator<'_, D>, &ConditionTerms),
         (symmetry, equilibrium): (Symmetry, Equilibrium),
         (rest, ranks): (&RunSettings<D>, Option<&'a dyn Ranks>),
         choices: &mut Vec<Decision>,
@@ -110,7 +110,7 @@ impl<'a> SpreadStiffness<'a> {
     /// # Errors
     /// [`RunError`] for supports that meet no site.
     fn new<const D: usize>(
-        (model, operator, terms): (&Model<D>, &dyn Operator<D>, &SpringRows),
+        (model, operator, terms): (&Model<D>, &Operator<'_, D>, &SpringRows),
         symmetry: Symmetry,
         rest: &RunSettings<D>,
         ranks: Option<&'a dyn Ranks>,

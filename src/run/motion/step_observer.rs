@@ -52,7 +52,7 @@ pub(super) enum Stop {
 /// Data that do not change while steps are taken with one layout of the zones.
 pub(super) struct Segment<'a, 'r, const D: usize> {
     pub model: &'a Model<D>,
-    pub operator: &'a dyn Operator<D>,
+    pub operator: &'a Operator<'a, D>,
     pub rest: &'r RunSettings<D>,
     pub spec: &'a Spec,
     pub options: &'a RunOptions<'r>,
@@ -68,7 +68,7 @@ pub(super) struct Segment<'a, 'r, const D: usize> {
 /// Fields of a model as output files show them.
 pub(super) struct FieldOutput<'a, const D: usize> {
     model: &'a Model<D>,
-    operator: &'a dyn Operator<D>,
+    operator: &'a Operator<'a, D>,
     zone_of_site: Vec<crate::model::Zone>,
     stresses: &'a StressSettings<D>,
     probes: FieldProbes,
@@ -80,7 +80,7 @@ impl<'a, const D: usize> FieldOutput<'a, D> {
     /// Of a model and the rows of its sites.
     pub fn new(
         model: &'a Model<D>,
-        operator: &'a dyn Operator<D>,
+        operator: &'a Operator<'a, D>,
         rest: &'a RunSettings<D>,
         options: &RunOptions<'_>,
     ) -> Self {

@@ -166,7 +166,7 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
     pub fn heated(
         mut self,
         thermal: Option<&'a Thermal<D>>,
-        operator: &dyn Operator<D>,
+        operator: &Operator<'_, D>,
         (system, is_linear): (&dyn SemiDiscrete, bool),
     ) -> Result<Self, RunError> {
         let Some(thermal) = thermal else {

@@ -28,7 +28,7 @@ const ALIKE: f64 = 1.0e-6;
 /// Subject of the proof, with data that several of its steps need.
 struct Subject<'a, const D: usize> {
     model: &'a Model<D>,
-    operator: &'a dyn Operator<D>,
+    operator: &'a Operator<'a, D>,
     stiffness: Option<&'a BlockCsr>,
     conditions: &'a [Condition<D>],
     /// The condition that holds each dof.

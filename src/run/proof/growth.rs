@@ -95,14 +95,14 @@ pub(crate) fn remedy(coupling: &CouplingSpec) -> &'static str {
 /// Collective, of processes. The energy of bonds is a sum of squares if no weight is negative, that of a state-based law below the Poisson ratio of its bonds too: its squares are those of volume and shape.
 pub(crate) fn proved<const D: usize>(
     model: &Model<D>,
-    operator: &dyn Operator<D>,
+    operator: &Operator<'_, D>,
     (ranks, system): (Option<&dyn Ranks>, &dyn SemiDiscrete),
     progress: &dyn Progress,
 ) -> Option<&'static str> {
     if system.symmetry() != Symmetry::Symmetric {
         return None;
     }
-    match operator.definiteness() {
+    match operator.definiteness {
         Definiteness::SumOfSquares => {}
         // or the run would have been refused
         Definiteness::NegativeTerms => return Some(FACTORISED),

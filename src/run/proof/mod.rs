@@ -43,7 +43,7 @@ pub struct Subject<'a, const D: usize> {
     /// The method that couples them.
     pub coupling: &'a dyn Coupling<D>,
     /// Rows of the stiffness.
-    pub operator: &'a dyn Operator<D>,
+    pub operator: &'a Operator<'a, D>,
     /// Settings that the run keeps of the scene.
     pub rest: &'a RunSettings<D>,
     /// The assembled stiffness, where the run has one; else rows come from the operator.

@@ -21,7 +21,7 @@ const SITES: [usize; 3] = [200, 500, 250];
 /// Model and boundary from which patches are cut.
 pub(super) struct Around<'a, const D: usize> {
     pub model: &'a Model<D>,
-    pub operator: &'a dyn Operator<D>,
+    pub operator: &'a Operator<'a, D>,
     /// The assembled stiffness, where the run has one.
     pub stiffness: Option<&'a BlockCsr>,
     pub boundary: &'a Boundary<'a, D>,
@@ -354,10 +354,9 @@ fn largest<const D: usize>(
     }
     cells.sort_unstable();
     cells.dedup();
-    let of_bonds = around.operator.cell_stresses();
     for c in cells.into_iter().filter(|&c| model.is_element(c)) {
         let node = |n: usize| model.node_transfer.displacement::<D>(n, u);
-        let of_bonds = of_bonds.and_then(|stresses| stresses.cell_stress(c, u));
+        let of_bonds = around.operator.cell_stress(c, u);
         let stress = of_bonds.unwrap_or_else(|| {
             let g = fem::displacement_gradient_at_centre(&model.mesh, c, node);
             model.tensor_of_cell(c).contract(&g)

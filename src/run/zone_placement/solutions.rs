@@ -228,7 +228,7 @@ fn solved<const D: usize>(
         &equilibrium::StaticInput {
             model: &model,
             coupling: coupling.as_ref(),
-            operator: operator.as_ref(),
+            operator: &operator,
             conditions,
             solver,
             time: t,

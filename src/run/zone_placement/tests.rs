@@ -289,7 +289,7 @@ fn a_scene_allocates_what_it_needs() {
     assert_eq!(u.len(), 201);
     assert_eq!(std::mem::size_of_val(&model.sites[0].position), 8);
     let operator = coupling.operator(&model).expect("rows");
-    let stiffness = model.assemble(operator.as_ref(), &Silent);
+    let stiffness = model.assemble(&operator, &Silent);
     assert_eq!((stiffness.block, stiffness.dofs()), (1, 201));
     // of a lattice that moves, bits of damage where bonds can break and none where they cannot
     let crack = "cracks.slit.segment={from=[0.8,0.5],to=[1.2,0.5]}";
@@ -308,7 +308,7 @@ fn a_scene_allocates_what_it_needs() {
             heat: None,
         };
         let symmetry = coupling.symmetry();
-        CoupledSystem::new(&model, operator.as_ref(), symmetry, |_| 1.0, &behaviour)
+        CoupledSystem::new(&model, &operator, symmetry, |_| 1.0, &behaviour)
             .expect("a motion")
             .pass()
             .expect("bonds")

@@ -226,7 +226,7 @@ fn run_crack(
     };
     let mut motion = CoupledSystem::new(
         &e.model,
-        operator.as_ref(),
+        &operator,
         e.coupling.symmetry(),
         |_| DENSITY,
         &behaviour,
