@@ -17,7 +17,8 @@ use crate::{
 };
 
 /// The points whose partial stress the row of a site takes, with the weights of these stresses.
-pub type StressesOn<'a, const D: usize> = Box<dyn Fn(usize) -> Vec<(usize, Vector<D>)> + Sync + 'a>;
+pub type StressesOn<'a, const D: usize> =
+    Box<dyn Fn(usize) -> Vec<(usize, Vector<D>)> + Send + Sync + 'a>;
 
 /// Partial stresses of peridynamic points in the rows of sites.
 pub struct PartialStresses<'a, const D: usize> {

@@ -8,7 +8,7 @@ use super::{NonlinearSeam, PartialStresses};
 use crate::{assembly::Row, model::Model, tensor::Tensor};
 
 /// Adds to the row of a site, minus the force there.
-pub type AddRow<'a, const D: usize> = Box<dyn Fn(usize, &mut Row<D>) + Sync + 'a>;
+pub type AddRow<'a, const D: usize> = Box<dyn Fn(usize, &mut Row<D>) + Send + Sync + 'a>;
 
 /// Evidence that the energy behind symmetric rows is never negative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,16 +35,16 @@ pub enum BondsOfSite {
 /// Bonds of the body between points, as the law has them.
 pub struct BodyBonds<'a, const D: usize> {
     /// The bonds in the row of a site.
-    pub at: Box<dyn Fn(usize) -> BondsOfSite + Sync + 'a>,
+    pub at: Box<dyn Fn(usize) -> BondsOfSite + Send + Sync + 'a>,
     /// Returns true if the bond between two points, the first of a site that has bonds [`BondsOfSite::Among`] other terms, is one of those. A bond that the seam cuts is not: as one of the body it would pull at its point as it rotates, and at the finite elements as if it did not.
-    pub holds: Box<dyn Fn(usize, usize) -> bool + Sync + 'a>,
+    pub holds: Box<dyn Fn(usize, usize) -> bool + Send + Sync + 'a>,
     /// For each site the feet of families that follow it, with their weights: it takes their forces. Empty where the body has none.
     pub feet: Vec<Vec<(u32, f64)>>,
 }
 
 impl<'a, const D: usize> BodyBonds<'a, D> {
     /// All bonds of the points that are `alone`, a predicate of sites, and none elsewhere.
-    pub fn alone(is_alone: impl Fn(usize) -> bool + Sync + 'a) -> Self {
+    pub fn alone(is_alone: impl Fn(usize) -> bool + Send + Sync + 'a) -> Self {
         Self {
             at: Box::new(move |site| match is_alone(site) {
                 true => BondsOfSite::Alone,
@@ -78,7 +78,7 @@ pub struct SeamBonds<'a, const D: usize> {
     /// Adds the row of a site at rest.
     pub add_row: AddRow<'a, D>,
     /// The same bonds, geometrically exact, or breaking; with them the whole bonds of the points at the seam, which leave [`BodyBonds`].
-    pub in_motion: Box<dyn Fn() -> NonlinearSeam<D> + Sync + 'a>,
+    pub in_motion: Box<dyn Fn() -> NonlinearSeam<D> + Send + Sync + 'a>,
     /// Adds what the row of a node has beside those.
     pub add_beside: AddRow<'a, D>,
 }
@@ -102,7 +102,7 @@ pub struct Operator<'a, const D: usize> {
     /// The terms, in the order in which their rows are added.
     pub terms: Vec<Term<'a, D>>,
     /// The blending function β of a site: 1 where it is peridynamic, 0 where it is local.
-    pub beta: Box<dyn Fn(usize) -> f64 + Sync + 'a>,
+    pub beta: Box<dyn Fn(usize) -> f64 + Send + Sync + 'a>,
     /// True if rows count elements and bonds by their materials, [`Row::count_only`]: only then do materials expand differently at the seam.
     pub counts_materials: bool,
     /// Evidence that the energy behind symmetric rows is never negative. Rows that are not symmetric have no such energy, and no run relies on it.
