@@ -67,6 +67,23 @@ fn one_lattice_has_a_seam_of_squares_at_every_ratio_and_its_bonds_may_break() {
     }
 }
 
+/// Every family of a plate four points thick lacks bonds: the fit has no loaded node to measure what is left by.
+#[test]
+fn a_thin_plate_of_glass_has_a_seam_of_squares() {
+    let folder = tempfile::tempdir().unwrap();
+    let solid = scene("0.22", ", critical-stretch = 0.1")
+        .replace("plane-strain", "solid")
+        .replace(
+            "mesh.rectangle = { min = [0, 0], max = [1.6, 1.6], x = { cells = 16 }, y = { cells = 16 } }",
+            "mesh.box = { min = [0, 0, 0], max = [1.6, 0.8, 0.4], x = { cells = 16 }, y = { cells = 8 }, z = { cells = 4 } }",
+        )
+        .replace("{ min = [0.4, 0.4], max = [1.2, 1.2] }", "{ min = [0.5, -1, -1], max = [1.1, 2, 1] }")
+        .replace("y = 0\n", "y = 0\n        z = 0\n");
+    write(folder.path(), "plate.toml", &solid);
+    let said = run(folder.path(), &[&["plate.toml"][..], &EXPLICIT].concat());
+    assert!(!said.contains("the seam is stable"), "{said}");
+}
+
 #[test]
 fn several_lattices_run_where_the_matrix_is_positive_and_say_so() {
     let folder = tempfile::tempdir().unwrap();

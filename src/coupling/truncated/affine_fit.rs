@@ -15,8 +15,8 @@ use super::corner_correction::EdgeCorrection;
 use super::squares::fit_factors;
 use crate::coupling::truncated::conditions::Conditions;
 use crate::coupling::truncated::fit_parts::{
-    FLOOR, MET, Part, cube, finish, loaded_nodes, pair_tensor, parts, points_at_seam, rounding,
-    third, triples,
+    FLOOR, MET, Part, cube, finish, largest_face, loaded_nodes, pair_tensor, parts, points_at_seam,
+    rounding, third, triples,
 };
 use crate::coupling::truncated::lps_constants::state_of;
 use crate::{model::ModelError, peridynamics::StatePart, tensor::Vector};
@@ -73,8 +73,8 @@ struct Missing<const D: usize> {
 
 fn missing<const D: usize>(segments: &Segments<'_, D>) -> Missing<D> {
     let nodes = loaded_nodes(segments);
-    let largest = nodes.values().map(|b| b.norm()).fold(0.0, f64::max);
     let tensor = pair_tensor(segments);
+    let scale = largest_face(segments, &nodes) * tensor.amax();
     let count = triples::<D>().count();
     let mut row_of_site = vec![NONE; segments.model.sites.len()];
     let mut rows = Vec::with_capacity(nodes.len() * count);
@@ -98,7 +98,7 @@ fn missing<const D: usize>(segments: &Segments<'_, D>) -> Missing<D> {
     Missing {
         nodes,
         missing,
-        scale: largest * tensor.amax(),
+        scale,
     }
 }
 

@@ -97,6 +97,17 @@ impl Part {
     }
 }
 
+/// The area of the largest face that loads a node; of a cell of the lattice where the points at the seam lack bonds all along it, as those of a thin plate do, and no node is loaded.
+pub(super) fn largest_face<const D: usize>(
+    segments: &Segments<'_, D>,
+    nodes: &FxHashMap<u32, Vector<D>>,
+) -> f64 {
+    match nodes.is_empty() {
+        true => segments.model.spacing().powi(D as i32 - 1),
+        false => nodes.values().map(|b| b.norm()).fold(0.0, f64::max),
+    }
+}
+
 /// Integrals of the gradient of the shape functions of the nodes at the seam over the elements around them, without nodes from whose faces bonds are missing.
 pub(super) fn loaded_nodes<const D: usize>(
     segments: &Segments<'_, D>,

@@ -16,8 +16,8 @@ use super::bond_segments::{End, Segments};
 use super::feet::{Shift, shifts};
 use crate::coupling::truncated::conditions::Conditions;
 use crate::coupling::truncated::fit_parts::{
-    FLOOR, MET, MOST_TRIPLES, Part, cube, finish, loaded_nodes, pair_tensor, parts, points_at_seam,
-    rounding, third, triples,
+    FLOOR, MET, MOST_TRIPLES, Part, cube, finish, largest_face, loaded_nodes, pair_tensor, parts,
+    points_at_seam, rounding, third, triples,
 };
 use crate::{model::ModelError, tensor::Vector};
 
@@ -53,9 +53,8 @@ pub(super) fn fit_factors<const D: usize>(
     is_state: bool,
 ) -> Result<f64, ModelError> {
     let nodes = loaded_nodes(segments);
-    let largest = nodes.values().map(|b| b.norm()).fold(0.0, f64::max);
     let tensor = pair_tensor(segments);
-    let scale = largest * tensor.amax();
+    let scale = largest_face(segments, &nodes) * tensor.amax();
     let enough = MET + rounding(segments);
     if is_state {
         // what belongs to no point has no dilatation
