@@ -118,9 +118,19 @@ impl<const D: usize> Embedded<D> {
         }
     }
 
+    /// The facets of the surface that cross cells.
+    pub fn crossings(&self) -> impl Iterator<Item = &BoundaryFacet> {
+        self.surface.values()
+    }
+
     /// Returns true if a patch is embedded in the mesh.
     pub fn has_patch(&self) -> bool {
         !self.covered.cells.is_empty()
+    }
+
+    /// Returns true if a cell is one of the patch, which are the first of the mesh.
+    pub fn is_of_patch(&self, c: usize) -> bool {
+        c < self.covered.cells.len()
     }
 
     /// The rules of a cell, where only a part of it belongs to the body.
@@ -158,6 +168,13 @@ impl<const D: usize> Embedded<D> {
 /// Returns true if a position lies in a simplex, or within rounding of it.
 fn in_simplex<const D: usize>(corners: &[Vector<D>; 4], x: &Vector<D>) -> bool {
     const SLACK: f64 = 1e-9;
+    let own = &corners[..=D];
+    let (low, high) =
+        (own.iter()).fold((own[0], own[0]), |(low, high), x| (low.inf(x), high.sup(x)));
+    let margin = (high - low) * (10.0 * SLACK);
+    if (0..D).any(|i| x[i] < low[i] - margin[i] || x[i] > high[i] + margin[i]) {
+        return false;
+    }
     let edges = Tensor::<D>::from_fn(|i, k| (corners[k + 1] - corners[0])[i]);
     let Some((inverse, _)) = inverse(&edges) else {
         return false;

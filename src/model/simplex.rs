@@ -129,20 +129,31 @@ impl<const D: usize> Simplex<D> {
 
     /// Cuts it by the plane `x[axis] = at`; hands what is below and above to `visit`, as simplices.
     pub fn cut(&self, axis: usize, at: f64, tolerance: f64, visit: &mut dyn FnMut(bool, &Self)) {
-        let height = |i: usize| self.corners[i][axis] - at;
-        let below = (0..self.count).find(|&i| height(i) < -tolerance);
-        let above = (0..self.count).find(|&i| height(i) > tolerance);
+        self.cut_by(&|x| x[axis] - at, &|x| x[axis] = at, tolerance, visit);
+    }
+
+    /// Cuts it by the plane whose distance from a position is a `height`; `settle` moves what rounding leaves beside the plane onto it.
+    pub fn cut_by(
+        &self,
+        height: &impl Fn(&Vector<D>) -> f64,
+        settle: &impl Fn(&mut Vector<D>),
+        tolerance: f64,
+        visit: &mut dyn FnMut(bool, &Self),
+    ) {
+        let heights = self.corners.map(|x| height(&x));
+        let below = (0..self.count).find(|&i| heights[i] < -tolerance);
+        let above = (0..self.count).find(|&i| heights[i] > tolerance);
         let (Some(p), Some(q)) = (below, above) else {
             visit(above.is_some(), self);
             return;
         };
-        let t = height(p) / (height(p) - height(q));
+        let t = heights[p] / (heights[p] - heights[q]);
         let mut x = self.corners[p] + (self.corners[q] - self.corners[p]) * t;
-        x[axis] = at;
+        settle(&mut x);
         for replaced in [p, q] {
             let mut part = *self;
             part.corners[replaced] = x;
-            part.cut(axis, at, tolerance, visit);
+            part.cut_by(height, settle, tolerance, visit);
         }
     }
 }
@@ -185,6 +196,23 @@ impl<const D: usize> Cells<D> {
         )
     }
 
+    /// The cells that a simplex meets; an extent of no size lies between two cells: the one that holds its middle.
+    pub fn range_of(&self, simplex: &Simplex<D>) -> ([i32; D], [i32; D]) {
+        let (low, high) = simplex.bounds();
+        let (from, to) = self.range(&low, &high);
+        let middle = self.index(&simplex.centre());
+        (
+            std::array::from_fn(|i| from[i].min(middle[i])),
+            std::array::from_fn(|i| to[i].max(middle[i])),
+        )
+    }
+
+    /// The plane between a layer of cells across an axis and the next, and the distance from it that is none.
+    pub fn plane_above(&self, axis: usize, layer: i32) -> (f64, f64) {
+        let plane = self.origin[axis] + (f64::from(layer) + 0.5) * self.spacing;
+        (plane, 1e-10 * self.spacing)
+    }
+
     /// Dices a simplex; hands each part with its cell to `visit`. Parts in cells that `wanted` refuses, by ranges, may be left out.
     pub fn dice(
         &self,
@@ -193,14 +221,8 @@ impl<const D: usize> Cells<D> {
         visit: &mut dyn FnMut([i32; D], &Simplex<D>),
     ) {
         let (low, high) = simplex.bounds();
-        let (from, to) = self.range(&low, &high);
-        // an extent of no size lies between two cells: the one that holds its middle
         let middle = self.index(&simplex.centre());
-        let at = |i: usize| (from[i].min(middle[i]), to[i].max(middle[i]));
-        let (from, to) = (
-            std::array::from_fn(|i| at(i).0),
-            std::array::from_fn(|i| at(i).1),
-        );
+        let (from, to) = self.range_of(simplex);
         if !wanted(&from, &to) {
             return;
         }
@@ -210,8 +232,7 @@ impl<const D: usize> Cells<D> {
             return;
         }
         let half = from[longest] + (to[longest] - from[longest] - 1) / 2;
-        let plane = self.origin[longest] + (f64::from(half) + 0.5) * self.spacing;
-        let tolerance = 1e-10 * self.spacing;
+        let (plane, tolerance) = self.plane_above(longest, half);
         let straddles = low[longest] < plane - tolerance && high[longest] > plane + tolerance;
         if !straddles {
             visit(middle, simplex);
@@ -226,9 +247,17 @@ impl<const D: usize> Cells<D> {
 /// The corners of a cell of a mesh as simplices: a quadrilateral as two triangles, a hexahedron with plane faces as six tetrahedra around its diagonal. Any other solid is divided from its centre, a bent face from
 /// its own: the volume of a trilinear hexahedron is that of these 24 tetrahedra [Grandy 1997, UCRL-ID-128886], and neighbours divide their face alike.
 pub(in crate::model) fn simplices_of<const D: usize>(mesh: &Mesh<D>, c: usize) -> Vec<Simplex<D>> {
-    if let Some(pieces) = mesh.embedded.pieces.get(&(c as u32)) {
-        return pieces.iter().map(|x| Simplex::of(&x[..=D])).collect();
+    match mesh.embedded.pieces.get(&(c as u32)) {
+        Some(pieces) => pieces.iter().map(|x| Simplex::of(&x[..=D])).collect(),
+        None => whole_simplices(mesh, c),
     }
+}
+
+/// As [`simplices_of`], of a cell as if it were whole.
+pub(in crate::model) fn whole_simplices<const D: usize>(
+    mesh: &Mesh<D>,
+    c: usize,
+) -> Vec<Simplex<D>> {
     let x: Vec<Vector<D>> = mesh
         .corners(c)
         .iter()

@@ -26,7 +26,7 @@
 //! | `balance.rs`, `rotation.rs`, `surface_gradient.rs`, `warnings.rs` | balance of loads and reactions; rotation of elements; stresses that families do not resolve; properties of a model that make its results doubtful |
 //! | `linear_parts.rs` | elements, rows and bonds that are linear, or stay whole, beyond where their material is |
 //! | `write.rs` | the files of a run |
-//! | `pieces.rs`, `point_cells.rs` | the piece of a VTU file that a process writes; the cells shown around points |
+//! | `pieces.rs`, `point_cells.rs`, `parts.rs` | the piece of a VTU file that a process writes; the cells shown around points; the parts shown of cut elements |
 //! | `error.rs` | errors of a run, with place and remedy |
 //! | `block.rs`, `observed_tests.rs` | a block from a scene, for unit tests; tests of the data that an observer receives |
 
@@ -49,6 +49,7 @@ pub mod loads;
 pub mod motion;
 #[cfg(test)]
 mod observed_tests;
+mod parts;
 pub mod pieces;
 pub(crate) mod placed_scene;
 mod point_cells;

@@ -1,6 +1,9 @@
 //! Piece of a model that each of several processes writes to its VTU file, and the numbers of its entities in the file that one process writes.
 
+use rustc_hash::FxHashMap;
+
 use super::loads::site_of_node;
+use super::parts::ElementParts;
 use super::point_cells::PointCells;
 use crate::mesh::CellShape;
 use crate::model::{Model, SiteKind};
@@ -16,8 +19,10 @@ const OTHERS: u32 = u32::MAX;
 /// A point is shown by the process that has its site, an element by the one that has the first of its nodes that is a site. Nodes on the border of two pieces stand in both.
 #[derive(Clone, Debug)]
 pub struct Piece {
-    /// The number of each cell of the mesh among the cells of the whole file.
+    /// The number of each cell of the mesh among the cells of the whole file; of one that is cut that of its first part.
     cells: Vec<u32>,
+    /// The number of the first corner of parts of each cut cell that is no node, among the points of the whole file.
+    corners: FxHashMap<u32, u32>,
     /// The number of each node among the points of the whole file.
     nodes: Vec<u32>,
     /// The number of the cell of each site that is a point, and of its first corner.
@@ -50,27 +55,33 @@ impl Piece {
         let (mesh, site_of) = (&model.mesh, site_of_node(model));
         let mut piece = Self {
             cells: vec![OTHERS; mesh.cell_count()],
+            corners: FxHashMap::default(),
             nodes: vec![OTHERS; mesh.nodes.len()],
             sites: vec![[OTHERS; 2]; model.sites.len()],
         };
         // in the order in which one process writes them
         let (mut cells, mut points) = (0, 0);
+        let parts = ElementParts::of(model, 0..mesh.cell_count());
         for c in (0..mesh.cell_count()).filter(|&c| model.is_element(c)) {
-            let nodes = mesh.cell(c);
-            for &n in nodes {
+            let cut = parts.get(&(c as u32));
+            for &n in cut.map_or(mesh.cell(c), |cut| &cut.nodes) {
                 let number = &mut piece.nodes[n as usize];
                 if *number == OTHERS {
                     *number = points;
                     points += 1;
                 }
             }
-            let mut sites = nodes.iter().filter_map(|&n| site_of[n as usize]);
+            if let Some(cut) = cut {
+                piece.corners.insert(c as u32, points);
+                points += cut.corners.len() as u32;
+            }
+            let mut sites = mesh.cell(c).iter().filter_map(|&n| site_of[n as usize]);
             // the first process has what has no site
             let owner = sites.next().map_or(0, |site| partition.owner(site));
             if owner == rank {
                 piece.cells[c] = cells;
             }
-            cells += 1;
+            cells += cut.map_or(1, |cut| cut.simplices.len() as u32);
         }
         let shapes = PointCells::of(model);
         for (site, s) in model.sites.iter().enumerate() {
@@ -86,9 +97,14 @@ impl Piece {
         piece
     }
 
-    /// The number of an element among the cells of the whole file, if this process shows it.
+    /// The number of an element, or of its first part, among the cells of the whole file, if this process shows it.
     pub fn cell(&self, c: usize) -> Option<u32> {
         Some(self.cells[c]).filter(|number| *number != OTHERS)
+    }
+
+    /// The number of the first corner of parts of a cut element that is no node, among the points of the whole file.
+    pub fn corner(&self, c: usize) -> u32 {
+        self.corners.get(&(c as u32)).copied().unwrap_or(OTHERS)
     }
 
     /// The number of a node among the points of the whole file.

@@ -14,7 +14,7 @@ use crate::scene::build::SceneBuilder;
 
 /// One solution: cells, points and fields, the same that a VTU file shows.
 ///
-/// Nodes of elements come first, then peridynamic points, or the corners of their cells with `output.points = "cells"`. Units are those of the scene.
+/// Nodes of elements, and corners of parts of elements that are cut, come first, then peridynamic points, or the corners of their cells with `output.points = "cells"`. Units are those of the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame(Snapshot);
 
@@ -100,7 +100,7 @@ impl Frame {
         self.vectors("displacement")
     }
 
-    /// A field over cells, elements first, then a vertex, or the cell around it, for each peridynamic point: one number per cell, or nine of a tensor, by rows.
+    /// A field over cells, elements and parts of elements that are cut first, then a vertex, or the cell around it, for each peridynamic point: one number per cell, or nine of a tensor, by rows.
     ///
     /// # Errors
     /// As [`Frame::field`].

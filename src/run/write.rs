@@ -10,12 +10,12 @@ use super::fields::On;
 use super::fields::columns::arrays;
 use super::fields::place::{Shared, Spot};
 use super::loads::site_of_node;
+use super::parts::ElementParts;
 use super::pieces::Piece;
 use super::point_cells::PointCells;
 use super::sections;
 use super::solution::Solved;
 use super::solution_samples::{SampledSolution, table_header};
-use crate::fem;
 use crate::mesh::CellShape;
 use crate::observe::ObserveError;
 use crate::observe::csv::{Entry, write_table};
@@ -189,11 +189,11 @@ pub fn snapshot<const D: usize>(
     rows.snapshot
 }
 
-/// Points and cells of a file as they are collected: nodes that elements use and elements, then peridynamic points, or the corners of their cells, and those cells.
+/// Points and cells of a file as they are collected: nodes that elements use, corners of parts of elements, and elements and parts, then peridynamic points, or the corners of their cells, and those cells.
 struct SnapshotRows<'a, const D: usize> {
     solved: &'a Solved<'a, D>,
     snapshot: Snapshot,
-    /// Node or point behind each point of the file.
+    /// Node, place in an element or point behind each point of the file.
     points: Vec<Spot>,
     /// Element or point behind each cell.
     cells: Vec<Spot>,
@@ -212,17 +212,18 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
         }
     }
 
-    /// Elements and their nodes.
+    /// Elements and their nodes; of those that are cut the part that is left, in simplices.
     fn push_elements(&mut self, shown: Shown<'_>) {
         let (model, mesh) = (self.solved.model, &self.solved.model.mesh);
         let mut point_of_node = vec![u32::MAX; mesh.nodes.len()];
         let site_of_node = site_of_node(model);
-        for c in 0..mesh.cell_count() {
-            if !shown.includes_cell(c) || !model.is_element(c) {
-                continue;
-            }
-            let mut nodes = [0u32; fem::MAX_NODES];
-            for (slot, &n) in nodes.iter_mut().zip(mesh.cell(c)) {
+        let cells = || (0..mesh.cell_count()).filter(|&c| shown.includes_cell(c));
+        let parts = ElementParts::of(model, cells());
+        let mut corners = Vec::new();
+        for c in cells().filter(|&c| model.is_element(c)) {
+            let cut = parts.get(&(c as u32));
+            corners.clear();
+            for &n in cut.map_or(mesh.cell(c), |cut| &cut.nodes) {
                 let node = n as usize;
                 let entry = &mut point_of_node[node];
                 if *entry == u32::MAX {
@@ -234,14 +235,44 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
                         self.identifiers[0].push(piece.node(node).into());
                     }
                 }
-                *slot = *entry;
+                corners.push(*entry);
             }
-            self.snapshot
-                .push_cell(mesh.shapes[c], &nodes[..mesh.cell(c).len()]);
-            self.cells.push(Spot::Element(c));
+            match cut {
+                None => {
+                    self.snapshot.push_cell(mesh.shapes[c], &corners);
+                    self.cells.push(Spot::Element(c));
+                }
+                Some(cut) => self.push_parts((c, cut), &mut corners, shown),
+            }
             if let Shown::Piece(piece) = shown {
-                self.identifiers[1].extend(piece.cell(c).map(i64::from));
+                let count = cut.map_or(1, |cut| cut.simplices.len()) as i64;
+                let first = piece.cell(c).map(i64::from);
+                self.identifiers[1].extend(first.into_iter().flat_map(|n| n..n + count));
             }
+        }
+    }
+
+    /// The part of a cut element that is left; `corners` are the points of its nodes there.
+    fn push_parts(
+        &mut self,
+        (c, cut): (usize, &ElementParts<D>),
+        corners: &mut Vec<u32>,
+        shown: Shown<'_>,
+    ) {
+        for (k, (x, spot)) in cut.corners.iter().enumerate() {
+            corners.push(self.snapshot.points.len() as u32);
+            self.snapshot.points.push(padded(x));
+            self.points.push(*spot);
+            if let Shown::Piece(piece) = shown {
+                let first = i64::from(piece.corner(c));
+                self.identifiers[0].push(first + k as i64);
+            }
+        }
+        for (simplex, volume) in &cut.simplices {
+            let own = simplex.map(|k| corners[k]);
+            self.snapshot
+                .push_cell(ElementParts::<D>::SHAPE, &own[..=D]);
+            self.cells.push(Spot::Part(c, *volume));
         }
     }
 
@@ -279,11 +310,7 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
     /// Adds the memory of laws at points.
     fn push_remembered_by_sites(&mut self, remembered: &[Remembered<'_>]) {
         for (name, values) in remembered {
-            let of = |spot: &Spot| match *spot {
-                Spot::Node { site, .. } => site.map_or(0.0, |site| values[site]),
-                Spot::Point(site) => values[site],
-                Spot::Element(_) | Spot::InElement(..) => 0.0,
-            };
+            let of = |spot: &Spot| self.solved.scalar_at(*spot, |site| values[site]);
             let field = Field::scalar(name, self.points.iter().map(of).collect());
             self.snapshot.point_fields.push(field);
         }
@@ -295,7 +322,9 @@ impl<'a, const D: usize> SnapshotRows<'a, D> {
         for (name, values) in state.flat_map(|state| state.remembered_by_cells()) {
             let values: FxHashMap<u32, f64> = values.into_iter().collect();
             let of = |spot: &Spot| match *spot {
-                Spot::Element(c) => values.get(&(c as u32)).copied().unwrap_or(0.0),
+                Spot::Element(c) | Spot::Part(c, _) => {
+                    values.get(&(c as u32)).copied().unwrap_or(0.0)
+                }
                 Spot::Node { .. } | Spot::InElement(..) | Spot::Point(_) => 0.0,
             };
             let field = Field::scalar(name, self.cells.iter().map(of).collect());

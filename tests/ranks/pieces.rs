@@ -198,6 +198,35 @@ fn points_shown_as_cells_keep_their_corners() {
     assert_same_numbers(whole.path(), parts.path());
 }
 
+#[test]
+fn so_do_parts_of_elements_that_a_rim_cuts() {
+    let text = plate("bond-based", "[coupling.truncated]", "")
+        .replace("[zones]", "[zones]\nrim = \"own\"")
+        .replace("x = { cells = 40 }", "x = { cells = 31 }")
+        .replace("min = [0, 0.0061]", "min = [0.008, 0.0061]")
+        .replace("from = [-0.01, 0.01]", "from = [0.012, 0.01]")
+        .replace(
+            "spacing = \"1e-3/3\"",
+            "spacing = \"1e-3/3\", origin = [1e-4, 2e-4]",
+        )
+        .replace(
+            "sections.cut = { point = [0.02, 0.01], normal = [1, 0] }",
+            "",
+        )
+        .replace("duration = 10e-6", "duration = 2e-6");
+    let whole = folder();
+    run(&text, whole.path(), ALONE).expect("one process");
+    let shown = read(&whole.path().join("scene_0000.vtu"));
+    let labels = &shown[0].fields[1]["model"];
+    for label in [3.0, 4.0] {
+        let count = labels.iter().filter(|found| **found == label).count();
+        assert!(count > 50, "{count} of {label}");
+    }
+    let parts = folder();
+    run(&text, parts.path(), several(3)).expect("several processes");
+    assert_same_numbers(whole.path(), parts.path());
+}
+
 /// A static scene is solved again in the same folder, on other processes: nothing of the earlier ones is left.
 #[test]
 fn files_of_a_scene_at_rest_replace_those_of_other_processes() {

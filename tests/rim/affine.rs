@@ -18,7 +18,7 @@ const GRADIENT: [[f64; 3]; 3] = [
 /// A case: coupling, Poisson's ratio (none of bonds alone), edge of the elements, shape of the zone.
 type Case = (&'static str, Option<f64>, f64, Drawn);
 
-fn field<const D: usize>(x: &[f64; 3]) -> [f64; 3] {
+pub fn field<const D: usize>(x: &[f64; 3]) -> [f64; 3] {
     let mut u = [0.0; 3];
     for i in 0..D {
         u[i] = (0..D).map(|j| GRADIENT[i][j] * x[j]).sum();
@@ -27,7 +27,7 @@ fn field<const D: usize>(x: &[f64; 3]) -> [f64; 3] {
 }
 
 /// The affine field on all of the surface.
-fn held<const D: usize>() -> Condition {
+pub fn held<const D: usize>() -> Condition {
     let component = |i: usize| Function::of_position(move |x| field::<D>(x)[i]);
     let on = Condition::displacement(SURFACE).x(component(0));
     match D {
@@ -37,7 +37,7 @@ fn held<const D: usize>() -> Condition {
 }
 
 /// Largest distance of a displacement from a field, over the largest displacement.
-fn error(solution: &Solution, field: impl Fn(&[f64; 3]) -> [f64; 3]) -> f64 {
+pub fn error(solution: &Solution, field: impl Fn(&[f64; 3]) -> [f64; 3]) -> f64 {
     let all = solution
         .points()
         .iter()

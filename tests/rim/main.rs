@@ -7,6 +7,7 @@ mod bad_input;
 mod convergence;
 mod crack;
 mod meshes;
+mod shown;
 mod structure;
 mod surfaces;
 

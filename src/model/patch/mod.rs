@@ -6,6 +6,7 @@
 //! | `cuts.rs` | elements that Γ cuts: what is left of them |
 //! | `tie.rs` | the displacement of the nodes of Γ, by a dual mortar |
 //! | `followers.rs` | nodes that no good element holds |
+//! | `left.rs` | what is left of cut cells, as simplices |
 //! | `surface.rs` | facets at the surface of the body that the patch covers |
 //! | `moments.rs`, `rows.rs`, `error.rs` | shared: moments of parts, rows of nodes that follow, errors |
 //! | `composite.rs` | zone, rim and what is left of the elements as one mesh |
@@ -26,12 +27,13 @@ mod composite;
 mod cuts;
 mod error;
 mod followers;
+mod left;
 mod moments;
 mod rows;
 mod surface;
 mod tie;
 
-pub use self::{composite::Patched, error::PatchError};
+pub use self::{composite::Patched, error::PatchError, left::Left};
 
 use std::{borrow::Cow, collections::BTreeMap};
 

@@ -21,8 +21,6 @@ impl<const D: usize> OutputField<D> for Beta {
 
     fn of<'s>(&self, solved: &'s Solved<'s, D>) -> Option<Found<'s, D>> {
         let beta = |site| (solved.operator.beta)(site);
-        Found::new("beta", move |place| {
-            Value::Scalar(place.site().map_or(0.0, beta))
-        })
+        Found::new("beta", move |place| Value::Scalar(place.scalar(beta)))
     }
 }

@@ -22,8 +22,6 @@ impl<const D: usize> OutputField<D> for Damage {
     fn of<'s>(&self, solved: &'s Solved<'s, D>) -> Option<Found<'s, D>> {
         let damage = solved.moved.damage?;
         let at = |site: usize| damage[site];
-        Found::new("damage", move |place| {
-            Value::Scalar(place.site().map_or(0.0, at))
-        })
+        Found::new("damage", move |place| Value::Scalar(place.scalar(at)))
     }
 }

@@ -26,8 +26,6 @@ impl<const D: usize> OutputField<D> for Horizon {
             (None, _) | (_, Zone::Local) => 0.0,
             (Some(p), _) => p.horizon.at(&model.sites[site].position),
         };
-        Found::new("horizon", move |place| {
-            Value::Scalar(place.site().map_or(0.0, of))
-        })
+        Found::new("horizon", move |place| Value::Scalar(place.scalar(of)))
     }
 }

@@ -96,9 +96,9 @@ impl<'s, const D: usize> Found<'s, D> {
 /// Places of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum On {
-    /// Nodes of elements and peridynamic points, or the corners of the cells that points are shown as.
+    /// Nodes of elements, corners of parts of elements, and peridynamic points, or the corners of the cells that points are shown as.
     Points,
-    /// Elements and peridynamic points.
+    /// Elements, parts of elements that are cut, and peridynamic points.
     Cells,
 }
 

@@ -2,6 +2,7 @@
 
 use std::cell::OnceCell;
 
+use crate::fem;
 use crate::model::{Carrier, Zone};
 use crate::peridynamics::PdBody;
 use crate::run::intact::Intact;
@@ -32,6 +33,8 @@ pub(in crate::run) enum Spot {
     Node { node: usize, site: Option<usize> },
     /// The whole of an element.
     Element(usize),
+    /// A part of an element that is cut, with its volume.
+    Part(usize, f64),
     /// Reference coordinates in an element.
     InElement(usize, [f64; 3]),
     /// A peridynamic point, by its site.
@@ -89,14 +92,14 @@ impl<'a, const D: usize> Place<'a, D> {
         match self.spot {
             Spot::Node { site, .. } => site,
             Spot::Point(site) => Some(site),
-            Spot::Element(_) | Spot::InElement(..) => None,
+            Spot::Element(_) | Spot::Part(..) | Spot::InElement(..) => None,
         }
     }
 
     /// Element.
     pub fn cell(&self) -> Option<usize> {
         match self.spot {
-            Spot::Element(c) | Spot::InElement(c, _) => Some(c),
+            Spot::Element(c) | Spot::Part(c, _) | Spot::InElement(c, _) => Some(c),
             Spot::Node { .. } | Spot::Point(_) => None,
         }
     }
@@ -105,16 +108,26 @@ impl<'a, const D: usize> Place<'a, D> {
     pub fn point(&self) -> Option<(&'a PdBody<D>, usize)> {
         match self.spot {
             Spot::Point(site) => self.solved.model.point_of(site),
-            Spot::Node { .. } | Spot::Element(_) | Spot::InElement(..) => None,
+            Spot::Node { .. } | Spot::Element(_) | Spot::Part(..) | Spot::InElement(..) => None,
         }
     }
 
-    /// `D` numbers of each site as a vector here, interpolated at nodes that are none; zero in elements.
+    /// A number of each site here, interpolated in elements; zero at nodes that are no sites.
+    pub fn scalar(&self, of: impl Fn(usize) -> f64) -> f64 {
+        self.solved.scalar_at(self.spot, of)
+    }
+
+    /// `D` numbers of each site as a vector here, interpolated in elements and at nodes that are no sites.
     pub fn vector(&self, values: &[f64]) -> Vector<D> {
         match self.spot {
             Spot::Node { node, .. } => self.solved.model.node_transfer.displacement(node, values),
             Spot::Point(site) => Vector::from_column_slice(&values[site * D..][..D]),
-            Spot::Element(_) | Spot::InElement(..) => Vector::zeros(),
+            Spot::InElement(c, xi) => {
+                let of = |site: usize| Vector::from_column_slice(&values[site * D..][..D]);
+                let sites = self.solved.sites_in(c, xi);
+                sites.map(|(site, w)| of(site) * w).sum()
+            }
+            Spot::Element(_) | Spot::Part(..) => Vector::zeros(),
         }
     }
 
@@ -127,7 +140,7 @@ impl<'a, const D: usize> Place<'a, D> {
     /// Displacement gradient: of an element at its centre or at the place, of a point that of its nearest bonds.
     pub fn gradient(&self) -> Tensor<D> {
         *self.gradient.get_or_init(|| match self.spot {
-            Spot::Element(c) => self.solved.element_gradient(c),
+            Spot::Element(c) | Spot::Part(c, _) => self.solved.element_gradient(c),
             Spot::InElement(c, xi) => self.solved.gradient_in(c, &xi),
             Spot::Point(_) => self.point().map_or_else(Tensor::zeros, |(_, p)| {
                 self.solved.point_gradient(p, &self.shared.intact)
@@ -140,7 +153,9 @@ impl<'a, const D: usize> Place<'a, D> {
     pub fn stress(&self) -> Stress<D> {
         let (solved, Shared { intact, expansions }) = (self.solved, self.shared);
         *self.stress.get_or_init(|| match self.spot {
-            Spot::Element(c) => solved.cell_stress(c, &self.gradient(), expansions),
+            Spot::Element(c) | Spot::Part(c, _) => {
+                solved.cell_stress(c, &self.gradient(), expansions)
+            }
             Spot::InElement(c, xi) => solved.stress_in(c, &xi, expansions),
             Spot::Point(site) => {
                 solved.point_stress(site, |p, j| intact.is_intact(p, j), expansions)
@@ -152,11 +167,36 @@ impl<'a, const D: usize> Place<'a, D> {
     /// Zone.
     pub fn zone(&self) -> Zone {
         match self.spot {
-            Spot::Element(c) | Spot::InElement(c, _) => self.solved.model.zones[c],
+            Spot::Element(c) | Spot::Part(c, _) | Spot::InElement(c, _) => {
+                self.solved.model.zones[c]
+            }
             Spot::Point(site) => self.solved.zone_of_site[site],
             Spot::Node { site, .. } => {
                 site.map_or(Zone::Local, |site| self.solved.zone_of_site[site])
             }
+        }
+    }
+}
+
+impl<const D: usize> Solved<'_, D> {
+    /// The sites that the displacement at reference coordinates in an element follows, with their weights.
+    fn sites_in(&self, c: usize, xi: [f64; 3]) -> impl Iterator<Item = (usize, f64)> {
+        let (model, xi) = (self.model, Vector::from_fn(|i, _| xi[i]));
+        let (shape, count) = fem::shape_values(&model.mesh, c, &xi);
+        let nodes = model.mesh.cell(c)[..count].iter().zip(shape);
+        nodes.flat_map(move |(&n, w)| {
+            let row = model.node_transfer.row(n as usize);
+            row.map(move |(site, v)| (site as usize, v * w))
+        })
+    }
+
+    /// A number of each site at a place, interpolated in elements; zero at nodes that are no sites.
+    pub(in crate::run) fn scalar_at(&self, spot: Spot, of: impl Fn(usize) -> f64) -> f64 {
+        match spot {
+            Spot::Node { site, .. } => site.map_or(0.0, of),
+            Spot::Point(site) => of(site),
+            Spot::InElement(c, xi) => self.sites_in(c, xi).map(|(site, w)| of(site) * w).sum(),
+            Spot::Element(_) | Spot::Part(..) => 0.0,
         }
     }
 }

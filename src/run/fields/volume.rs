@@ -1,5 +1,6 @@
 //! Volume of a cell.
 
+use super::place::Spot;
 use super::{About, Found, On, OutputField, Rank, TableColumns, Value, WrittenWhen};
 use crate::fem;
 use crate::run::solution::Solved;
@@ -16,7 +17,7 @@ impl<const D: usize> OutputField<D> for Volume {
             rank: Rank::Scalar,
             wanted: WrittenWhen::Always,
             columns: TableColumns::Never,
-            text: "Volume of an element or of a point.",
+            text: "Volume of an element, of a part of one that is cut, or of a point.",
         }
     }
 
@@ -25,7 +26,10 @@ impl<const D: usize> OutputField<D> for Volume {
         Found::new("volume", move |place| {
             let of_point = || place.point().map_or(0.0, |(body, p)| body.cloud.volume[p]);
             let of_cell = |c| fem::cell_volume(mesh, c);
-            Value::Scalar(place.cell().map_or_else(of_point, of_cell))
+            Value::Scalar(match place.spot {
+                Spot::Part(_, volume) => volume,
+                _ => place.cell().map_or_else(of_point, of_cell),
+            })
         })
     }
 }
