@@ -8,8 +8,11 @@ use crate::{
     parallel,
     peridynamics::{
         BondWeights, Families, Family, LatticeBonds, LinearForceState, PartialVolume, StatePart,
-        TIE_TOLERANCE, collapsed_tensor, isotropic_shell_factors, offset_table::OffsetTable,
-        partial_volume::lattice_shells, plane_energy,
+        TIE_TOLERANCE, collapsed_tensor, isotropic_shell_factors,
+        offset_table::OffsetTable,
+        partial_volume::lattice_shells,
+        plane_energy,
+        softened_plane::{StateBonds, crack_energy},
     },
     shape::Barriers,
     tensor::{Tensor, Tensor4, Vector},
@@ -300,6 +303,18 @@ impl<const D: usize> WholeFamily<D> {
             .as_ref()
             .map_or((0.0, 0.0), |s| (s.modulus.get(0, 0, 0, 0), s.deviator));
         plane_energy(self.spacing, &self.bonds, state, deviator)
+    }
+
+    /// `G0/s_0²` of a crack whose bonds soften up to `s_c/s_e = ratio`, [`crack_energy`].
+    pub fn crack_energy(&self, ratio: f64) -> f64 {
+        let modulus = |s: &StatePart<D>| s.modulus.get(0, 0, 0, 0);
+        let bonds = StateBonds {
+            spacing: self.spacing,
+            bonds: &self.bonds,
+            state: self.state.as_ref().map_or(0.0, modulus),
+            tensor: &self.tensor,
+        };
+        crack_energy(&bonds, ratio)
     }
 
     /// Energy that bonds which act alone take across a plane, `Σ ½ |ξ·n| p |ξ|⁴ V`, its mean over all normals over that over the axes.

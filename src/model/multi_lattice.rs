@@ -314,16 +314,16 @@ impl<const D: usize> Model<D> {
         Ok(())
     }
 
-    /// The horizon of each lattice with what a plane through it costs to open, over the square of the critical stretch ([`crate::peridynamics::plane_energy`]) \[m\], \[J/m²\].
-    /// Points that are no lattice count as one of their spacing.
+    /// The horizon of each lattice with what a plane through it costs to open, over the square of the critical stretch \[m\], \[J/m²\]: of bonds that break at once ([`crate::peridynamics::plane_energy`]), or that soften
+    /// up to `s_c/s_e` ([`crate::peridynamics::softened_plane`]). Points that are no lattice count as one of their spacing.
     ///
     /// # Errors
     /// [`ModelError::Family`] if the law has no coefficients there.
-    pub fn plane_energies(&self) -> Result<Vec<(f64, f64)>, ModelError> {
+    pub fn plane_energies(&self, softening: Option<f64>) -> Result<Vec<(f64, f64)>, ModelError> {
         let Some(p) = &self.peridynamics else {
             return Ok(Vec::new());
         };
-        self.plane_energies_of(p.law.linearised())
+        self.plane_energies_of(p.law.linearised(), softening)
     }
 
     /// Energy that bonds across a plane take, its mean over the directions of the plane over that along the axes of the lattice, of each lattice.
@@ -345,10 +345,13 @@ impl<const D: usize> Model<D> {
     pub fn plane_energies_of(
         &self,
         law: &dyn LinearForceState<D>,
+        softening: Option<f64>,
     ) -> Result<Vec<(f64, f64)>, ModelError> {
         let of = |(factors, horizon): &(LatticeFactors<D>, f64)| {
             let family = factors.regular_family(law, *horizon)?;
-            Ok((*horizon, family.plane_energy()))
+            let at_once = || family.plane_energy();
+            let per_square = softening.map_or_else(at_once, |ratio| family.crack_energy(ratio));
+            Ok((*horizon, per_square))
         };
         self.lattices.factors.iter().map(of).collect()
     }

@@ -17,7 +17,7 @@ pub struct CrackSummary {
     pub area: f64,
     /// Dissipated energy over area; none without a crack.
     pub energy_per_area: Option<f64>,
-    /// Energy per area of a plane along the lattice's axes at the critical stretch; none with several lattices.
+    /// Energy per area of a plane along the lattice's axes at the critical stretch, or of a crack whose bonds soften; none with several lattices.
     pub plane_energy: Option<f64>,
     /// The fracture energy that the scene has; none where it has a critical stretch.
     pub fracture_energy: Option<f64>,

@@ -57,6 +57,7 @@ pub mod partial_volume;
 pub mod position_aware_influence;
 pub mod shape_tensor;
 pub mod shell_weights;
+pub mod softened_plane;
 pub mod softening;
 pub mod zero_energy;
 

@@ -423,12 +423,14 @@ pub(crate) fn failure_criterion<const D: usize>(
         Threshold::Energy(energy) => energy,
     };
     let mut list = Vec::new();
+    let softening = rest.breaking.softening.softening().map(|s| s.ratio);
     // brittle bonds take it on planes along the lattice, where cracks of the papers run
-    let over_directions = match rest.breaking.softening.softening() {
+    let over_directions = match softening {
         Some(_) => model.mean_over_axis_planes()?,
         None => Vec::new(),
     };
-    for (lattice, (horizon, along_axes)) in model.plane_energies()?.into_iter().enumerate() {
+    let planes = model.plane_energies(softening)?;
+    for (lattice, (horizon, along_axes)) in planes.into_iter().enumerate() {
         let per_square = along_axes * over_directions.get(lattice).unwrap_or(&1.0);
         let Some(bonds) = p.law.bond_energy(horizon) else {
             return Err(SystemError::Law { law: p.law.name() }.into());
@@ -468,7 +470,7 @@ pub(crate) fn failing_stretch<const D: usize>(
         .map(begins))
 }
 
-/// Returns the energy per area of opening a plane of the lattice at the critical stretch, and the fracture energy of the scene; none where nothing breaks, or where lattices differ.
+/// Returns the energy per area of opening a plane of the lattice at the critical stretch, or of a crack whose bonds soften, and the fracture energy of the scene; none where nothing breaks, or where lattices differ.
 pub(crate) fn plane_energy<const D: usize>(
     model: &Model<D>,
     rest: &RunSettings<D>,
@@ -481,7 +483,8 @@ pub(crate) fn plane_energy<const D: usize>(
     let Some(stretch) = critical.single().filter(|_| knows_energy) else {
         return Ok(None);
     };
-    let planes = model.plane_energies()?;
+    let softening = rest.breaking.softening.softening();
+    let planes = model.plane_energies(softening.map(|s| s.ratio))?;
     let [(_, per_square)] = planes[..] else {
         return Ok(None);
     };

@@ -22,7 +22,7 @@ impl<const D: usize> Stretches<'_, D> {
     /// Returns the energy of opening a plane per square of the critical stretch \[J/m²\], of points of one material.
     fn per_square(&self, material: u16) -> Result<f64, RunError> {
         let law = self.law.law(material);
-        let planes = self.model.plane_energies_of(law.linearised())?;
+        let planes = self.model.plane_energies_of(law.linearised(), None)?;
         let Some(&(horizon, per_square)) = planes.first() else {
             return Ok(0.0);
         };
