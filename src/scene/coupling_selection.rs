@@ -186,7 +186,7 @@ fn obstacle<const D: usize>(
 }
 
 /// Returns true if the faces of the zone are planes of the lattice, or halfway between them, and their nodes too.
-fn follows<const D: usize>(
+pub(super) fn follows<const D: usize>(
     mesh: &Mesh<D>,
     zones: &[Zone],
     spacing: f64,

@@ -1,6 +1,7 @@
 //! The scene with a rim of its own around the nonlocal zone: horizon and points by the mesh as it is, everything else by the mesh with the patch.
 
 use super::conditions::Condition;
+use super::coupling_selection::follows;
 use super::draft::Draft;
 use super::error::{SceneError, SceneErrorKind};
 use super::region::{self, Region};
@@ -47,16 +48,55 @@ pub(crate) fn scene<const D: usize>(
         .map(|c| c.get_ref().traits().zones);
     let is_alone = matches!(typed, Some(ZonesNeeded::Everywhere(_)));
     match wanted(draft.spec).filter(|_| !is_alone) {
-        Some(span) => with_rim(draft, placed, span),
-        None => draft.scene(placed),
+        Some(span) => with_rim(draft, placed, span, "the scene asks for a rim of its own"),
+        None => Ok(before_others(draft, placed, draft.scene(placed)?)),
     }
 }
 
-/// The scene whose seam runs along a rim of its own; `span` is where it asks for that.
+/// Lets truncated bonds have a rim of their own where the faces of the mesh do not follow the lattice: before others in space, where such faces rarely hold them and make steps short; after they turn out not to hold them elsewhere. A rim that is
+/// wrong there is none.
+fn before_others<const D: usize>(
+    draft: &Draft<'_, D>,
+    placed: Option<&Placed>,
+    mut scene: Scene<D>,
+) -> Scene<D> {
+    let (zones, lattice) = (
+        &draft.spec.zones,
+        scene.peridynamics.as_ref().map(|p| &p.points),
+    );
+    let (Some(zone), None, Some(Points::Lattice { spacing, origin })) =
+        (&zones.nonlocal, &zones.rim, lattice)
+    else {
+        return scene;
+    };
+    let law = scene.point_law.linearised();
+    let cuts_bonds = scene.coupling.build(law).interface().faces;
+    let is_first = D == 3 && cuts_bonds;
+    let may_fail = is_first || cuts_bonds && scene.otherwise.is_some();
+    if !may_fail || follows(&scene.mesh, &scene.zones, *spacing, origin) {
+        return scene;
+    }
+    let why = "the faces of the mesh do not follow the lattice";
+    match with_rim(draft, placed, zone.span(), why) {
+        Ok(mut rim) if is_first => {
+            rim.otherwise = Some(Box::new(scene));
+            rim
+        }
+        Ok(mut rim) => {
+            rim.otherwise = scene.otherwise.take();
+            scene.otherwise = Some(Box::new(rim));
+            scene
+        }
+        Err(_) => scene,
+    }
+}
+
+/// The scene whose seam runs along a rim of its own; `span` is where it asks for that, or draws the zone.
 fn with_rim<const D: usize>(
     draft: &Draft<'_, D>,
     placed: Option<&Placed>,
     span: Span,
+    why: &str,
 ) -> Result<Scene<D>, SceneError> {
     refuse_others(draft.spec, &span)?;
     let truncated = CouplingSpec::Truncated(TruncatedSpec::default());
@@ -104,7 +144,7 @@ fn with_rim<const D: usize>(
             ));
         }
     }
-    let choice = told(&patched, spacing * f64::from(per_cell));
+    let choice = told(&patched, spacing * f64::from(per_cell), why);
     let zone = Placed {
         nonlocal: patched.nonlocal,
         span: (draft.spec.zones.nonlocal.as_ref()).map_or(span, |zone| zone.span()),
@@ -125,7 +165,7 @@ fn with_rim<const D: usize>(
 }
 
 /// Says how large the rim is, and what of the mesh ends at it.
-fn told<const D: usize>(patched: &Patched<D>, edge: f64) -> Decision {
+fn told<const D: usize>(patched: &Patched<D>, edge: f64, why: &str) -> Decision {
     let embedded = &patched.mesh.embedded;
     let linear = match patched.linear {
         0 => String::new(),
@@ -138,7 +178,7 @@ fn told<const D: usize>(patched: &Patched<D>, edge: f64) -> Decision {
             number(edge),
             embedded.cut.len() - embedded.pieces.len(),
         ),
-        why: "the scene asks for a rim of its own".to_owned(),
+        why: why.to_owned(),
     }
 }
 

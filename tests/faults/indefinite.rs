@@ -40,10 +40,18 @@ const MOTION: &str = "\n[solve.explicit]\nduration = 12\noutputs = 1\n";
 fn a_seam_whose_energy_may_be_negative_is_refused_at_rest_and_in_motion() {
     // the motion ran away within nine steps of what was called a sum of squares, and statics took an LU factorisation without a word
     for text in [BLOCK.to_owned(), BLOCK.to_owned() + MOTION] {
-        let said = Case::new(&text).run(&[]).expect_err("it has no minimum");
+        let case = Case::new(&text);
+        let along_the_mesh = ["--set", "zones.rim=\"mesh\""];
+        let said = case.run(&along_the_mesh).expect_err("it has no minimum");
         let said = flat(&said);
         assert!(said.contains("negative eigenvalue"), "{said}");
         assert!(said.contains("peridynamics.points out"), "{said}");
+        // a rim of its own has one, and is taken where nothing is typed
+        let summary = case.run(&[]).expect("its seam follows the lattice");
+        assert!(
+            summary["choices"].to_string().contains("a rim of"),
+            "{summary}"
+        );
     }
 }
 

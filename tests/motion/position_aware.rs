@@ -79,6 +79,10 @@ fn seams_that_would_have_to_be_fitted_and_families_without_a_solution_are_refuse
     let zone = "[zones.nonlocal]\nbox = { min = [3, 3, 3], max = [4, 4, 4] }\n";
     let typed = cube("truncated", "pals", fields()[0].0) + zone;
     let off = typed.replace("[0.5, 0.5, 0.5] }", "[0.4, 0.3, 0.4] }");
+    // a rim of its own follows the lattice
+    let choices = summary(folder.path(), &off)["choices"].to_string();
+    assert!(choices.contains("a rim of"), "{choices}");
+    let off = off + "[zones]\nrim = \"mesh\"\n";
     // each of these couplings runs in position_aware_seams.rs
     for part in [
         "where a position-aware solid has two",
