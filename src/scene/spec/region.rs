@@ -35,7 +35,7 @@ pub struct ZonesSpec {
     /// Cells of the nonlocal zone that are elements all the same, so that no bond is missing there.
     #[serde(default)]
     pub skin: Option<SkinSpec>,
-    /// Cells along which the seam runs; "mesh" if left out.
+    /// Cells along which the seam runs. If left out, those of the mesh; but with truncated bonds whose faces do not follow the lattice "own", in 3D at once, else where they do not hold.
     #[serde(default)]
     #[schemars(with = "Option<RimSpec>")]
     pub rim: Option<Spanned<RimSpec>>,
