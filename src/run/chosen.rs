@@ -28,25 +28,35 @@ fn with_each<const D: usize, T>(
     other.solver = scene.solver;
     other.title = scene.title.clone();
     let is_typed = scene.coupling_why.is_none();
-    let (first, second) = (scene.coupling.traits().name, other.coupling.traits().name);
+    let [first, second] = [tried(&scene), tried(&other)];
     match then(scene) {
         Err(reason) if reason.is_of_coupling() => {
-            let tried = format!("`{first}` was tried and does not hold: {reason}");
+            let why = format!("{first} was tried and does not hold: {reason}");
             other.coupling_why = Some(match is_typed {
-                true => tried,
-                false => format!("the scene names none; {tried}"),
+                true => why,
+                false => format!("the scene names none; {why}"),
             });
-            with_each(*other, then).map_err(|error| match error.is_of_coupling() {
-                true => RunError::NoCoupling {
-                    first,
-                    reason: Box::new(reason),
-                    second,
-                    error: Box::new(error),
+            with_each(*other, then).map_err(|error| match error {
+                RunError::NoCoupling { mut tried } => {
+                    tried.insert(0, (first, reason));
+                    RunError::NoCoupling { tried }
+                }
+                error if error.is_of_coupling() => RunError::NoCoupling {
+                    tried: vec![(first, reason), (second, error)],
                 },
-                false => error,
+                error => error,
             })
         }
         done => done,
+    }
+}
+
+/// The coupling of a scene as it is told of, with the faces along which it is tried.
+fn tried<const D: usize>(scene: &Scene<D>) -> String {
+    let name = scene.coupling.traits().name;
+    match scene.mesh.embedded.has_patch() {
+        true => format!("`{name}` with a rim of its own"),
+        false => format!("`{name}`"),
     }
 }
 

@@ -88,19 +88,11 @@ pub enum RunError {
         /// The ratio of a pairwise law.
         pairwise: f64,
     },
-    /// No coupling that the program would choose holds.
-    #[error(
-        "no coupling holds of those that suit a scene that names none. `{first}`: {reason}. `{second}`: {error}"
-    )]
+    /// No coupling that the program would choose holds, along no faces.
+    #[error("no coupling that was tried holds{}", each_tried(tried))]
     NoCoupling {
-        /// The coupling tried first.
-        first: &'static str,
-        /// Reason why it does not hold.
-        reason: Box<RunError>,
-        /// The coupling tried next.
-        second: &'static str,
-        /// Reason why that does not hold either.
-        error: Box<RunError>,
+        /// The couplings in the order in which they were tried, and why each does not hold.
+        tried: Vec<(String, RunError)>,
     },
     /// The state cannot be carried over to other zones.
     #[error(transparent)]
@@ -184,6 +176,11 @@ pub enum RunError {
     },
 }
 
+fn each_tried(tried: &[(String, RunError)]) -> String {
+    let one = |(name, why): &(String, RunError)| format!(". {name}: {why}");
+    tried.iter().map(one).collect()
+}
+
 impl RunError {
     /// Returns the place of the error, if that is known: a position, the key of a condition, or a file.
     pub fn place(&self) -> Option<String> {
@@ -204,7 +201,7 @@ impl RunError {
             Self::Solve(StaticError::NotFinite { position, .. }) => at(position),
             Self::Observe(error) => Some(error.path().display().to_string()),
             Self::Checkpoint(error) => Some(error.path().display().to_string()),
-            Self::NoCoupling { error, .. } => error.place(),
+            Self::NoCoupling { tried } => tried.last().and_then(|(_, error)| error.place()),
             Self::Idle { condition, .. } => Some(format!("conditions.{condition}")),
             Self::EmptySection { section, .. } => Some(format!("output.sections.{section}")),
             _ => None,

@@ -181,21 +181,21 @@ fn obstacle<const D: usize>(
     if let Some(reason) = doubt {
         return Ok(Some(Obstacle::Possible(reason)));
     }
-    Ok((!follows(mesh, &zones, spacing, &origin))
+    Ok((!follows(mesh, &zones, (spacing, &origin), FOLLOWS))
         .then(|| Obstacle::Possible("the faces of the zone do not follow the lattice".to_owned())))
 }
 
-/// Returns true if the faces of the zone are planes of the lattice, or halfway between them, and their nodes too.
+/// Returns true if the faces of the zone are planes of the lattice, or halfway between them, and their nodes too, within a tolerance in spacings.
 pub(super) fn follows<const D: usize>(
     mesh: &Mesh<D>,
     zones: &[Zone],
-    spacing: f64,
-    origin: &Vector<D>,
+    (spacing, origin): (f64, &Vector<D>),
+    tolerance: f64,
 ) -> bool {
     let nonlocal: Vec<bool> = zones.iter().map(|&z| z == Zone::Nonlocal).collect();
     let facets = mesh.interface_facets(&nonlocal, &true, &false);
     let at = |n: u32| (mesh.nodes[n as usize] - origin) / spacing;
-    let near = |x: f64| (x - x.round()).abs() <= FOLLOWS;
+    let near = |x: f64| (x - x.round()).abs() <= tolerance;
     let shifted = |shift: f64| {
         facets.iter().all(|f| {
             f.first
@@ -206,7 +206,7 @@ pub(super) fn follows<const D: usize>(
     };
     let upright = facets.iter().all(|f| {
         let n = mesh.facet_normal_area(&f.first);
-        D == 1 || n.norm() - n.amax() <= FOLLOWS * n.norm()
+        D == 1 || n.norm() - n.amax() <= tolerance * n.norm()
     });
     upright && (shifted(0.5) || shifted(0.0))
 }

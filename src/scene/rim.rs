@@ -53,8 +53,11 @@ pub(crate) fn scene<const D: usize>(
     }
 }
 
-/// Lets truncated bonds have a rim of their own where the faces of the mesh do not follow the lattice: before others in space, where such faces rarely hold them and make steps short; after they turn out not to hold them elsewhere. A rim that is
-/// wrong there is none.
+/// Distance, in spacings, by which faces may deviate from the lattice and still keep a seam: the digits of a file.
+const OFF: f64 = 1e-3;
+
+/// Gives truncated bonds a rim of their own where the faces of the mesh do not follow the lattice. In space, where such faces rarely hold them and make steps short, it comes before the faces; elsewhere it comes after these turn
+/// out not to hold them. Where a rim is refused the faces stay, and the run says why.
 fn before_others<const D: usize>(
     draft: &Draft<'_, D>,
     placed: Option<&Placed>,
@@ -73,7 +76,7 @@ fn before_others<const D: usize>(
     let cuts_bonds = scene.coupling.build(law).interface().faces;
     let is_first = D == 3 && cuts_bonds;
     let may_fail = is_first || cuts_bonds && scene.otherwise.is_some();
-    if !may_fail || follows(&scene.mesh, &scene.zones, *spacing, origin) {
+    if !may_fail || follows(&scene.mesh, &scene.zones, (*spacing, origin), OFF) {
         return scene;
     }
     let why = "the faces of the mesh do not follow the lattice";
@@ -87,7 +90,15 @@ fn before_others<const D: usize>(
             scene.otherwise = Some(Box::new(rim));
             scene
         }
-        Err(_) => scene,
+        Err(refused) => {
+            if is_first {
+                scene.choices.push(Decision {
+                    choice: "the seam along the faces of the mesh".to_owned(),
+                    why: format!("a rim of its own is refused: {}", refused.message()),
+                });
+            }
+            scene
+        }
     }
 }
 

@@ -77,7 +77,7 @@ pub struct Scene<const D: usize> {
     pub solver: Solver,
     /// Output files.
     pub output: Output<D>,
-    /// The scene with the coupling to go on with, if this one was chosen and turns out not to hold.
+    /// The scene to go on with, by another coupling or along other faces, if this one was chosen and turns out not to hold.
     pub(crate) otherwise: Option<Box<Self>>,
     /// Warnings of parts that touch nothing.
     pub unused: Vec<String>,
