@@ -4,6 +4,8 @@
 
 #![deny(clippy::wildcard_enum_match_arm)]
 
+use std::collections::BTreeMap;
+
 use super::Subject;
 use crate::fem;
 use crate::mesh::Facet;
@@ -421,7 +423,15 @@ fn supports<const D: usize>(
         let nearest = nearest_points(model, &site_of, nodes, facets);
         let h = model.spacing();
         let off = |(x, s): &(Vector<D>, usize)| (model.sites[*s].position - x).norm() / h;
-        let Some(worst) = nearest.iter().max_by(|a, b| off(a).total_cmp(&off(b))) else {
+        // a piece of the face beside which no point lies has those of its neighbours: each point counts by the nearest piece
+        let mut of_point: BTreeMap<usize, (Vector<D>, usize)> = BTreeMap::new();
+        for found in nearest {
+            let best = of_point.entry(found.1).or_insert(found);
+            if off(&found) < off(best) {
+                *best = found;
+            }
+        }
+        let Some(worst) = of_point.values().max_by(|a, b| off(a).total_cmp(&off(b))) else {
             continue;
         };
         held = true;
