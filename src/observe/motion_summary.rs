@@ -23,6 +23,8 @@ pub enum Ended {
     EnergyGained,
     /// An element rotated more than the scene allows.
     ElementsRotated,
+    /// The body has parted: load steps that are left would move what no longer resists.
+    Parted,
 }
 
 /// Energy that a motion gained without work: by a coupling of unsymmetric stiffness, or by a step that has become too large for its law.
@@ -264,6 +266,11 @@ impl MotionSummary {
             Ended::ElementsRotated => writeln!(
                 f,
                 "stopped                where an element rotated beyond largest-rotation"
+            ),
+            Ended::Parted => writeln!(
+                f,
+                "ended                  with the body parted: it stores less than a thousandth of its largest energy, {} load steps are left; solve.quasi-static.when-parted = \"continue\" takes them",
+                self.of_steps - self.steps
             ),
         }
     }

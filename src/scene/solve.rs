@@ -7,6 +7,7 @@ use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
 use super::spec::{
     BeyondLimitSpec, ExplicitSpec, GrowingModesSpec, LoadStepSpec, QuasiStaticSpec, SolveSpec,
+    WhenPartedSpec,
 };
 use super::value::{Count, Every, Number, StepTimes};
 use crate::observe::checkpoint::Pace;
@@ -68,6 +69,8 @@ pub struct QuasiStatic {
     pub max_iterations: usize,
     /// Rotation of an element in degrees at which the run stops.
     pub largest_rotation: Option<f64>,
+    /// Treatment of a body that has parted.
+    pub when_parted: WhenPartedSpec,
     /// Load steps between VTU files.
     pub output_every: usize,
     /// Interval at which a checkpoint is written.
@@ -395,6 +398,7 @@ fn quasi_static(spec: &QuasiStaticSpec) -> Result<QuasiStatic, SceneError> {
         tolerance,
         max_iterations,
         largest_rotation: rotation(&place("largest-rotation"), spec.largest_rotation.as_ref())?,
+        when_parted: spec.when_parted,
         output_every: match &spec.outputs {
             Some(n) => steps.div_ceil(n.value.max(1)),
             None => 1,

@@ -399,6 +399,7 @@ const WITHOUT_EFFECT: &[&[&str]] = &[
     &["solve", "explicit", "largest-energy-gain"],
     &["solve", "explicit", "largest-rotation"],
     &["solve", "quasi-static", "largest-rotation"],
+    &["solve", "quasi-static", "when-parted"],
     &["solve", "explicit", "checkpoint-every"],
     &["solve", "quasi-static", "checkpoint-every"],
 ];

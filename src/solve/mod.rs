@@ -12,6 +12,7 @@
 //! | `ordering.rs`, `symbolic.rs` | elimination orders; elimination tree, supernodes and costs |
 //! | `multifrontal.rs`, `frontal_matrix.rs` | numerical factorisation over that tree; of one dense front |
 //! | `factor_time_estimate.rs` | its duration |
+//! | `probes.rs` | a sparse matrix from its products with few vectors |
 //! | `krylov.rs` | conjugate gradients and restarted GMRES |
 //! | `multigrid.rs`, `aggregation.rs`, `smoother.rs` | smoothed-aggregation multigrid, its coarse matrices, its smoothers |
 //! | `singularity_diagnosis.rs` | free motions of a singular system |
@@ -31,6 +32,7 @@ mod multifrontal;
 pub mod multigrid;
 mod neighbourhood;
 pub mod ordering;
+mod probes;
 pub mod quasi_static;
 mod singularity_diagnosis;
 pub mod smoother;

@@ -12,6 +12,8 @@
 //! Both set out along the linear prediction, which moves all of the body: supports that move alone would strain the bonds beside them far beyond what the body ever sees, and a law that
 //! softens would settle there.
 //!
+//! While bonds break on, states in between are found to a tolerance of 1e-5; one in which none breaks is then found to that of the load step, and looked at again.
+//!
 //! Pieces that are torn off trouble neither: what acts on them is in balance. Where all is torn apart no force is left to measure a residual by; so it
 //! is measured by the largest of the load step too, and is done at the round-off of the displacement.
 
@@ -193,6 +195,7 @@ pub fn run(
         lead: Lead::default(),
         residuals: Vec::new(),
         is_torn: false,
+        is_between: false,
     };
     let mut values = vec![0.0; prescribed.len()];
     let mut info = QuasiStaticInfo::default();
@@ -304,8 +307,13 @@ impl Run<'_> {
                 interval,
                 FailureUpdate::Update,
             );
-            if now.is_none() {
+            if now.is_none() && !self.is_between {
                 break residual;
+            }
+            // where nothing breaks any more the state is found to the tolerance of the load step, and looked at again
+            self.is_between = !now.is_none();
+            if now.is_none() {
+                continue;
             }
             self.system.account_for_breaks(&Halfway::at(u));
             broken += now.broken;

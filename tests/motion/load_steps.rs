@@ -365,3 +365,79 @@ fn bonds_of_a_seam_that_fits_nothing_break_by_their_whole_stretch() {
         assert!(broken(coupling, "2.6e-5") > 500.0, "{coupling}");
     }
 }
+
+/// A notched plate that is pulled until it parts, in steps that are longer than its crack takes.
+const PULLED: &str = r#"
+kinematics = "plane-stress"
+coupling = "truncated"
+[mesh.rectangle]
+min = [0, 0]
+max = [24, 12]
+x = { cells = 24 }
+y = { cells = 12 }
+[materials.m.lps]
+youngs-modulus = 1000
+poisson-ratio = 0.2
+fracture-energy = 0.01
+[peridynamics]
+horizon = 3
+points.lattice = { spacing = 1, origin = [0.5, 0.5] }
+[zones]
+nonlocal.box = { min = [6, -1], max = [18, 13] }
+[cracks.notch]
+polyline = [[12, -1], [12, 4]]
+[conditions.left.displacement]
+inside.box = { min = [-1, -1], max = [3, 13] }
+x = 0
+y = 0
+[conditions.right.displacement]
+inside.box = { min = [21, -1], max = [25, 13] }
+x = "0.1 * t"
+y = 0
+[solve.quasi-static]
+steps = 10
+[output]
+vtu = false
+"#;
+
+#[test]
+fn a_body_that_has_parted_ends_the_run_unless_it_is_to_go_on() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "pulled.toml", PULLED);
+    let summary = |more: &[&str]| {
+        let arguments = [&["pulled.toml", "--json"], more].concat();
+        let said = run(folder.path(), &arguments);
+        serde_json::from_str::<serde_json::Value>(&said).unwrap()["motion"].clone()
+    };
+    let parted = summary(&[]);
+    assert_eq!(parted["ended"], "parted");
+    let steps = parted["steps"].as_u64().unwrap();
+    assert!((2..10).contains(&steps), "{steps}");
+    let rows = column(&folder.path().join("out/pulled_history.csv"), "step");
+    assert_eq!(rows.last(), Some(&(steps as f64)));
+    let whole = summary(&["--set", "solve.quasi-static.when-parted=continue"]);
+    assert_eq!(whole["ended"], "finished");
+    assert_eq!(whole["steps"], 10);
+    assert_eq!(whole["broken_bonds"], parted["broken_bonds"]);
+    let said = run(folder.path(), &["pulled.toml"]);
+    let left = format!("{} load steps are left", 10 - steps);
+    assert!(said.contains(&left), "{said}");
+}
+
+#[test]
+fn factors_without_the_broken_bonds_lead_to_the_same_states() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "pulled.toml", PULLED);
+    let of = |method: &str| {
+        let set = format!("solver.method={method}");
+        let said = run(folder.path(), &["pulled.toml", "--json", "--set", &set]);
+        let summary: serde_json::Value = serde_json::from_str(&said).unwrap();
+        let choices = summary["choices"].to_string();
+        (summary["motion"].clone(), choices)
+    };
+    let [(led, told), (iterated, _)] = ["auto", "krylov"].map(of);
+    assert!(told.contains("of whose tangents were factorised"), "{told}");
+    assert_eq!(led["broken_bonds"], iterated["broken_bonds"]);
+    let work = |m: &serde_json::Value| m["external_work"].as_f64().unwrap();
+    assert!((work(&led) / work(&iterated) - 1.0).abs() < 1e-6);
+}

@@ -38,6 +38,7 @@ y = 0
 [solve.quasi-static]
 duration = 1
 steps = {steps}
+when-parted = "continue"
 [output]
 vtu = false
 "#;

@@ -86,7 +86,8 @@ fn factors_of_which_each_process_has_a_part_lead_to_the_same_equilibria() {
                 let largest = wanted.iter().fold(0.0f64, |m, x| m.max(x.abs()));
                 for (a, b) in found.iter().zip(&wanted) {
                     assert!(
-                        (a - b).abs() <= 1e-8 * largest + 1e-13,
+                        // work is summed over states between breaking bonds, which are found to 1e-5
+                        (a - b).abs() <= 1e-6 * largest + 1e-13,
                         "{coupling}, {ranks} processes, column {column}: {a} for {b}"
                     );
                 }

@@ -355,7 +355,7 @@ fn run(
     };
     let summary = summary.map_err(|e| miette::miette!("{e}"))?;
     let code = match summary.motion.as_ref().map(|m| m.ended) {
-        None | Some(Ended::Finished) => DONE,
+        None | Some(Ended::Finished | Ended::Parted) => DONE,
         Some(Ended::DamageAtEdge | Ended::EnergyGained | Ended::ElementsRotated) => AT_EDGE,
         Some(Ended::Interrupted) => INTERRUPTED,
     };

@@ -21,7 +21,7 @@
 //! | `supports.rs` | supports of the body: forces and displacements of conditions |
 //! | `probe_rows.rs`, `section_rows.rs` | columns of the history for probes, and for sections through the body |
 //! | `material_stretches.rs` | the stretch at which bonds of each material break |
-//! | `crack_growth.rs` | growth of cracks within a load step |
+//! | `crack_growth.rs`, `created_energy.rs`, `parted.rs` | growth of cracks within a load step; energy that load steps set free or created; the end where a body has parted |
 //! | `tables.rs` | tables beside the history: tips of cracks, states along lines |
 //! | `tips.rs` | position of a crack tip |
 //! | `writer.rs` | history, VTU files, tips of cracks, checkpoints |
@@ -30,6 +30,7 @@
 pub(crate) mod bounding_boxes;
 pub mod breaks;
 mod crack_growth;
+mod created_energy;
 mod doubtful_equilibria;
 pub(crate) mod driven_impactors;
 pub mod dynamic_system;
@@ -41,6 +42,7 @@ pub(crate) mod initial_state;
 mod inside_step;
 mod material_stretches;
 mod newton_factors;
+mod parted;
 mod probe_rows;
 pub mod quasi_static;
 pub(crate) mod rezoning;

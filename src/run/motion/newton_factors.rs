@@ -75,7 +75,7 @@ impl CoarsenedStiffness {
 pub(super) struct NewtonFactors {
     pub factor: Factor,
     info: DirectInfo,
-    /// The stiffness, if elements know their tangent at a displacement, which is then factorised too.
+    /// The stiffness, if elements know their tangent at a displacement, or bonds may break: other tangents are then factorised too.
     stiffness: Option<BlockCsr>,
     symmetry: Symmetry,
     positions: Vec<[f64; 3]>,
@@ -121,7 +121,8 @@ impl NewtonFactors {
             ),
         });
         // impactors are no sites of the stiffness
-        let is_kept = rest.has_nonlinear_elements(model) && rest.impactors.is_empty();
+        let changes = rest.has_nonlinear_elements(model) || rest.breaking.breaks();
+        let is_kept = changes && rest.impactors.is_empty();
         Ok(Some(Self {
             stiffness: is_kept.then_some(stiffness),
             factor,
@@ -133,7 +134,7 @@ impl NewtonFactors {
         }))
     }
 
-    /// Returns the factorisation of tangents at a displacement; none without nonlinear elements, and none with impactors.
+    /// Returns the factorisation of tangents at a displacement and of those that broken bonds leave; none without nonlinear elements or breaking bonds, and none with impactors.
     pub fn of_present_tangents(&self) -> Option<TangentFactors<'_>> {
         let problem = StaticProblem {
             stiffness: self.stiffness.as_ref()?,

@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use super::RunOptions;
 use super::breaks::{Breaks, breaks, damage_at_edge};
+use super::created_energy::{created_energy, set_free};
 use super::doubtful_equilibria::DoubtfulEquilibria;
 use super::dynamic_system::{failing_stretch, plane_energy, start};
 use super::explicit::{cracks, inelastic_energy, sizes};
@@ -14,6 +15,7 @@ use super::guard::energies_are_apart;
 use super::impact::{BodyOnly, impacted};
 use super::impact_record::ImpactRecord;
 use super::inside_step::InsideStep;
+use super::parted::has_parted;
 use super::saved::{EdgeReached, Saved, StepChoice};
 use super::setup::{ModelSetup, laid_out, opened, restore};
 use super::spread_factors::Leads;
@@ -35,7 +37,7 @@ use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
 use crate::run::warnings::{of_elements, unusual_stretch, warnings, without_response};
 use crate::scene::solve::QuasiStatic as Spec;
-use crate::scene::spec::{EdgeSpec, LoadStepSpec};
+use crate::scene::spec::{EdgeSpec, LoadStepSpec, WhenPartedSpec};
 use crate::scene::validated::Scene;
 use crate::solve::explicit::{Drive, State};
 use crate::solve::krylov::LinearMap;
@@ -387,7 +389,9 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         let now = (self.state.step, self.state.time);
         self.parts.look(&self.state.u, now, &mut self.seen.passed);
         self.find_damage_at_edge(seen);
-        self.find_reason_to_end();
+        let held = self.drive.prescribed();
+        let has_parted = has_parted(seen, held, &mut self.seen.largest_stored);
+        self.find_reason_to_end(has_parted);
         // before the files appear, which tell others that the run has begun
         if begins {
             self.options.begin_steps();
@@ -439,8 +443,8 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         self.state.step == self.pace.steps
     }
 
-    /// Finds the reason, if any, to end the run with this load step: damage at the edge, an interrupt, elements that have rotated too far.
-    fn find_reason_to_end(&mut self) {
+    /// Finds the reason, if any, to end the run with this load step: damage at the edge, an interrupt, elements that have rotated too far, a body that has parted.
+    fn find_reason_to_end(&mut self, has_parted: bool) {
         let interrupt = self.options.interrupt;
         if self.edge.is_some() && self.rest.breaking.at_edge == EdgeSpec::Stop {
             self.ended = Ended::DamageAtEdge;
@@ -451,6 +455,10 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         let limit = self.spec.largest_rotation.unwrap_or(f64::INFINITY);
         if self.ended == Ended::Finished && found.as_ref().is_some_and(|r| r.degrees > limit) {
             self.ended = Ended::ElementsRotated;
+        }
+        let may_end = self.spec.when_parted == WhenPartedSpec::End && !self.is_last();
+        if self.ended == Ended::Finished && has_parted && may_end {
+            self.ended = Ended::Parted;
         }
         let when = Some((self.state.step, self.state.time));
         self.rotation = found.and_then(|r| self.rotations.told(r.degrees, r.place, 0.0, 0.0, when));
@@ -472,7 +480,10 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         }
         let shown = begins
             || last
-            || matches!(self.ended, Ended::DamageAtEdge | Ended::ElementsRotated)
+            || matches!(
+                self.ended,
+                Ended::DamageAtEdge | Ended::ElementsRotated | Ended::Parted
+            )
             || state.step.is_multiple_of(self.spec.output_every as u64);
         let leave = self.ended != Ended::Finished || (last && recorder.keeps_state());
         if begins {
@@ -563,38 +574,4 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             ..RunSummary::default()
         })
     }
-}
-
-/// Energy that load steps set free by breaking, and that they dissipated \[J\] (per metre of thickness in 2D, per square metre of section in 1D).
-fn set_free(motion: &MotionSummary) -> [f64; 2] {
-    let dissipated =
-        motion.cracks.map_or(0.0, |c| c.dissipated_energy) + motion.inelastic_energy.unwrap_or(0.0);
-    [motion.missing_energy - dissipated, dissipated]
-}
-
-/// Part of the work from which on energy that load steps created is warned of. Work is summed by the trapezoidal rule, which errs by the square of a step.
-const CREATED: f64 = 0.02;
-
-/// Warns of energy that nothing supplied: stored and dissipated energy beyond the work of loads and supports.
-fn created_energy<const D: usize>(
-    model: &Model<D>,
-    motion: &MotionSummary,
-    u: &[f64],
-) -> Option<String> {
-    /// Part of the energy of a strain as large as the displacement over the size of the body that is left by equilibria that are found to a tolerance: 2e-12 of a body that load steps rotate by half a radian.
-    const ROUND_OFF: f64 = 1e-11;
-    let created = -set_free(motion)[0];
-    let work = motion.external_work.abs().max(motion.stored_energy);
-    let volume: f64 = (0..model.mesh.cell_count())
-        .map(|c| model.mesh.cell_volume(c).abs())
-        .sum();
-    let furthest = u.iter().fold(0.0, |most: f64, u| most.max(u.abs()));
-    let strain = furthest / volume.powf(1.0 / D as f64);
-    let none = ROUND_OFF * model.tensor_of_cell(0).get(0, 0, 0, 0) * strain * strain * volume;
-    (created > (CREATED * work).max(none)).then(|| {
-        format!(
-            "stored and dissipated energy exceed the work of loads and supports by {} % of it: take smaller load steps, between which the work is summed by trapezoids; if that does not help, let coupling = \"nonlocal\" carry what rotates or cracks",
-            number(100.0 * created / work)
-        )
-    })
 }

@@ -17,6 +17,8 @@ pub struct Seen {
     pub(super) rotated: Option<Rotated>,
     /// Largest excesses over the limits of linear parts.
     pub(super) passed: Passed,
+    /// The largest energy that load steps stored \[J\], and the norm of the prescribed displacements then \[m\].
+    pub(super) largest_stored: (f64, f64),
 }
 
 /// An element that has rotated.

@@ -49,7 +49,7 @@ pub use mesh::{
 pub use motion::{
     BeyondLimitSpec, BondsSpec, CalibrationSpec, ContactSpec, ElementsSpec, ExplicitSpec,
     GrowingModesSpec, InitialFieldSpec, InitialSpec, LoadStepSpec, NoOptionsSpec, PrecisionSpec,
-    QuasiStaticSpec, SolveSpec, TipSpec,
+    QuasiStaticSpec, SolveSpec, TipSpec, WhenPartedSpec,
 };
 pub use named_law::Given;
 pub use region::{

@@ -108,12 +108,26 @@ pub struct QuasiStaticSpec {
     /// Rotation of an element in degrees at which the run stops; none if left out.
     #[serde(default)]
     pub largest_rotation: Option<Number>,
+    /// Treatment of a body that has parted; "end" if left out.
+    #[serde(default)]
+    pub when_parted: WhenPartedSpec,
     /// Number of VTU files after the first; one per step if left out.
     #[serde(default)]
     pub outputs: Option<Count>,
     /// Checkpoint after this many steps, or after this time of the clock: 10, "10 min".
     #[serde(default)]
     pub checkpoint_every: Option<Every>,
+}
+
+/// Treatment of a body that has parted: bonds have broken, and it stores less than a thousandth of its largest energy at prescribed displacements that are no smaller.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum WhenPartedSpec {
+    /// The run ends.
+    #[default]
+    End,
+    /// It goes on.
+    Continue,
 }
 
 /// Solution method of a load step.

@@ -5,7 +5,7 @@
 //!
 //! The preconditioner is the factors at hand, those of the tangent at rest at first. What an iteration with them has cost is added up; once it reaches what a factorisation costs, factors are made of the present
 //! tangent. Whatever follows, no more than twice the time is spent that the better of the two would have taken from there on. Each load step begins with the factors at rest again, so that a run that
-//! resumes has the bits of one that went through.
+//! resumes has the bits of one that went through. Where bonds have broken, factors of the tangent that is left are made by the same rule, from its products.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -135,7 +135,8 @@ impl Run<'_> {
             free: &self.free,
         };
         let diagonal = Diagonal(&self.inverse);
-        let near = self.aids.near.unwrap_or(&diagonal);
+        let own = self.lead.factors.as_deref();
+        let near = own.or(self.aids.near).unwrap_or(&diagonal);
         let symmetry = self.system.symmetry();
         solve(&tangent, near, &self.residual, symmetry, params, &self.aids)
     }
@@ -185,6 +186,25 @@ impl Run<'_> {
         self.lead.is_useless = !known.is_whole && 2 * info.iterations > last;
         self.lead.last = info.iterations;
         Ok((solution, before + info.iterations))
+    }
+
+    /// Makes factors of the tangent at rest without the broken bonds, once iterations with those at hand have cost as much; beside elements that know their tangent, factors are of that.
+    pub(super) fn leave_out_broken(&mut self) {
+        let Some(refactor) = self.aids.refactor.filter(|_| self.is_torn) else {
+            return;
+        };
+        if self.lead.spent_torn == 0 || self.lead.spent_torn < refactor.worth_of_products() {
+            return;
+        }
+        let tangent = AtRest {
+            system: &*self.system,
+            free: &self.free,
+        };
+        self.lead.spent_torn = 0;
+        self.lead.factorisations += 1;
+        if let Some(factors) = refactor.factors_of(&tangent, self.system.symmetry()) {
+            self.lead.factors = Some(factors);
+        }
     }
 
     /// Makes factors of the present tangent; those at hand stay where it has none.

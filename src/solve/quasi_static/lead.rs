@@ -9,6 +9,8 @@ pub(super) struct Lead {
     pub factors: Option<Box<dyn LinearMap>>,
     /// Iterations beyond the first of each correction since the factors at hand came to hand.
     pub spent: usize,
+    /// Iterations beyond the first of each correction since bonds broke or were last left out of factors.
+    pub spent_torn: usize,
     /// Iterations of the correction before.
     pub last: usize,
     /// True if new factors have led hardly better than those before: the part of the tangent that elements do not have decides.

@@ -153,9 +153,17 @@ impl Run<'_> {
             }
             _ => "take smaller load steps",
         };
+        let known = match (self.tangent, length) {
+            (Tangent::Present, Some(_)) => {
+                known.or_else(|| self.system.element_tangent(u, self.interval))
+            }
+            _ => None,
+        };
+        if known.is_none() {
+            self.leave_out_broken();
+        }
         let solved = match (self.tangent, length) {
             (Tangent::Present, Some(length)) => {
-                let known = known.or_else(|| self.system.element_tangent(u, self.interval));
                 self.solve_at_present(u, length, known.as_ref(), &params)
             }
             _ => {
@@ -173,6 +181,7 @@ impl Run<'_> {
                 remedy,
             },
         })?;
+        self.lead.spent_torn += iterations.saturating_sub(1);
         Ok((correction, iterations.max(1)))
     }
 

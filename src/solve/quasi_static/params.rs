@@ -47,6 +47,13 @@ pub trait Refactor: Sync {
 
     /// Returns the number of iterations that take as long as a factorisation.
     fn worth(&self) -> usize;
+
+    /// Factors of a tangent at rest of which bonds are broken, by its products; none where a tangent that is to be symmetric has directions of no or negative stiffness.
+    fn factors_of(&self, tangent: &dyn LinearMap, symmetry: Symmetry)
+    -> Option<Box<dyn LinearMap>>;
+
+    /// Returns the number of iterations that take as long as such products and their factorisation.
+    fn worth_of_products(&self) -> usize;
 }
 
 /// Preconditioners of a run, and its listener.
@@ -54,7 +61,7 @@ pub trait Refactor: Sync {
 pub struct Aids<'a> {
     /// An inverse of the tangent before bonds broke, or something near it, symmetric if the tangent is; it saves Newton's method iterations.
     pub near: Option<&'a dyn LinearMap>,
-    /// Makes factors of the tangent at a displacement where elements know it; if absent, those of `near` serve throughout.
+    /// Makes factors of the tangent at a displacement where elements know it, and of that which broken bonds leave; if absent, those of `near` serve throughout.
     pub refactor: Option<&'a dyn Refactor>,
     /// Listener to iterations within a load step; it may end the run there.
     pub progress: &'a dyn Progress,
