@@ -50,7 +50,7 @@ pub(crate) fn linear_at_seam<const D: usize>(
 }
 
 /// A node of a cell that lies off the middle of its edge, with its distance from there over the length of the edge, if there is one.
-pub(crate) fn bent_side<const D: usize>(mesh: &Mesh<D>, c: usize) -> Option<(Vector<D>, f64)> {
+fn bent_side<const D: usize>(mesh: &Mesh<D>, c: usize) -> Option<(Vector<D>, f64)> {
     mesh.mid_sides(c).find_map(|side| {
         let [x, p, q] = [side.node, side.ends[0], side.ends[1]].map(|n| mesh.nodes[n as usize]);
         let distance = (x - (p + q) * 0.5).norm() / (q - p).norm();

@@ -272,7 +272,7 @@ y = 0
             (
                 "peridynamics.points.lattice.spacing=0.08",
                 "truncated",
-                "do not follow",
+                "the scene names none",
             ),
             (
                 "peridynamics.horizon=0.3 + 0.01*x",

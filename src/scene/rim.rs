@@ -14,7 +14,7 @@ use super::validated::Scene;
 use super::zones::Placed;
 use crate::fem::Locator;
 use crate::mesh::facet_corners;
-use crate::model::patch::{self, PatchError, PatchLattice, Patched};
+use crate::model::patch::{self, Linear, PatchError, PatchLattice, Patched};
 use crate::model::{Reach, Zone};
 use crate::observe::report::number;
 use crate::observe::summary::Decision;
@@ -53,11 +53,14 @@ pub(crate) fn scene<const D: usize>(
     }
 }
 
+/// Distance of the middle of a side from a straight one, over the edge of a cell of the rim, that is not told: the digits of a file.
+const STRAIGHT: f64 = 1e-6;
+
 /// Distance, in spacings, by which faces may deviate from the lattice and still keep a seam: the digits of a file.
 const OFF: f64 = 1e-3;
 
-/// Gives truncated bonds a rim of their own where the faces of the mesh do not follow the lattice. In space, where such faces rarely hold them and make steps short, it comes before the faces; elsewhere it comes after these turn
-/// out not to hold them. Where a rim is refused the faces stay, and the run says why.
+/// Gives the zone a rim of its own where its faces do not follow the lattice: for bonds that end on faces, and for families that reach into elements other than boxes along the axes, in which fields are interpolated to lower order. Where
+/// a rim is refused the faces stay, and the run says why.
 fn before_others<const D: usize>(
     draft: &Draft<'_, D>,
     placed: Option<&Placed>,
@@ -73,33 +76,46 @@ fn before_others<const D: usize>(
         return scene;
     };
     let law = scene.point_law.linearised();
-    let cuts_bonds = scene.coupling.build(law).interface().faces;
-    let is_first = D == 3 && cuts_bonds;
-    let may_fail = is_first || cuts_bonds && scene.otherwise.is_some();
-    if !may_fail || follows(&scene.mesh, &scene.zones, (*spacing, origin), OFF) {
+    let interface = scene.coupling.build(law).interface();
+    let gains = interface.faces || interface.overlap && is_beside_others_than_boxes(&scene);
+    if !gains || follows(&scene.mesh, &scene.zones, (*spacing, origin), OFF) {
         return scene;
     }
     let why = "the faces of the mesh do not follow the lattice";
     match with_rim(draft, placed, zone.span(), why) {
-        Ok(mut rim) if is_first => {
+        Ok(mut rim) => {
             rim.otherwise = Some(Box::new(scene));
             rim
         }
-        Ok(mut rim) => {
-            rim.otherwise = scene.otherwise.take();
-            scene.otherwise = Some(Box::new(rim));
-            scene
-        }
         Err(refused) => {
-            if is_first {
-                scene.choices.push(Decision {
-                    choice: "the seam along the faces of the mesh".to_owned(),
-                    why: format!("a rim of its own is refused: {}", refused.message()),
-                });
-            }
+            scene.choices.push(Decision {
+                choice: "the seam along the faces of the mesh".to_owned(),
+                why: format!("a rim of its own is refused: {}", refused.message()),
+            });
             scene
         }
     }
+}
+
+/// Returns true if an element with a node on the zone is no box along the axes.
+fn is_beside_others_than_boxes<const D: usize>(scene: &Scene<D>) -> bool {
+    let (mesh, zones) = (&scene.mesh, &scene.zones);
+    let mut is_at_zone = vec![false; mesh.nodes.len()];
+    let zone = (0..zones.len()).filter(|&c| zones[c] == Zone::Nonlocal);
+    zone.flat_map(|c| mesh.corners(c))
+        .for_each(|&n| is_at_zone[n as usize] = true);
+    let mut others = (0..zones.len()).filter(|&c| zones[c] != Zone::Nonlocal);
+    others.any(|c| {
+        let corners = mesh.corners(c);
+        let (low, high) = mesh.bounds_of(corners);
+        let size = (high - low).amax();
+        let at_corner = |&n: &u32| {
+            let x = mesh.nodes[n as usize];
+            (0..D).all(|i| (x[i] - low[i]).min(high[i] - x[i]) <= OFF * size)
+        };
+        let is_box = corners.len() == 1 << D && corners.iter().all(at_corner);
+        corners.iter().any(|&n| is_at_zone[n as usize]) && !is_box
+    })
 }
 
 /// The scene whose seam runs along a rim of its own; `span` is where it asks for that, or draws the zone.
@@ -136,17 +152,14 @@ fn with_rim<const D: usize>(
         per_cell: 1,
         within: around(draft, placed, &before),
         has_masses: matches!(draft.solve, Solve::Explicit(_)),
+        may_part: before.breaking.breaks()
+            || !draft.spec.cracks.is_empty()
+            || !draft.spec.voids.is_empty(),
         reach: reach(draft.spec, &before)
             .map_err(|what| conflict(what, "or use rim = \"mesh\""))?,
     };
     let (patched, per_cell) = embedded(draft, placed, &before, lattice)
         .map_err(|error| conflict(format!("`zones.rim`: {error}"), "or use rim = \"mesh\""))?;
-    if D == 3 && ends_on_faces(&before) && is_zone_cut(&patched) {
-        return Err(conflict(
-            "`zones.rim`: a surface that follows no plane between lattice cells cuts the zone, whose bonds then have no balance along its edges in 3D".to_owned(),
-            "keep the zone inside of the body, let planes between the lattice's cells be its surface (peridynamics.points.lattice), use coupling.splice, or rim = \"mesh\"",
-        ));
-    }
     for condition in &draft.conditions {
         if let Some(what) = conflict_with(condition, draft, &patched) {
             return Err(conflict(
@@ -178,10 +191,15 @@ fn with_rim<const D: usize>(
 /// Says how large the rim is, and what of the mesh ends at it.
 fn told<const D: usize>(patched: &Patched<D>, edge: f64, why: &str) -> Decision {
     let embedded = &patched.mesh.embedded;
-    let linear = match patched.linear {
+    let Linear { cells, moved } = patched.linear;
+    let mut linear = match cells {
         0 => String::new(),
         n => format!(", {n} of second order are linear there"),
     };
+    if moved > STRAIGHT * edge {
+        let moved = number(moved);
+        linear += &format!(", with straight sides, which move their surfaces by up to {moved}");
+    }
     Decision {
         choice: format!(
             "a rim of {} elements of edge {} around the zone; {} elements of the mesh end at it{linear}",
@@ -352,15 +370,6 @@ fn embedded<const D: usize>(
         },
         Solve::Static | Solve::QuasiStatic(_) => embed(1),
     }
-}
-
-/// Returns true if the bonds of a scene end on the faces of its zone.
-fn ends_on_faces<const D: usize>(scene: &Scene<D>) -> bool {
-    let interface = scene
-        .coupling
-        .build(scene.point_law.linearised())
-        .interface();
-    interface.faces || interface.feet
 }
 
 /// Returns true if the surface of the body cuts a cell of the zone.

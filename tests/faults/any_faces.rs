@@ -47,7 +47,7 @@ fn affine_fields_store_their_energy_at_every_poisson_ratio() {
 #[test]
 fn triangles_move_and_keep_their_energy_below_the_pairwise_ratio_and_when_bonds_may_break() {
     // half of the plate thrown against the other: linear bonds, and exact ones that may break but do not
-    let rest = "[initial.wave.velocity]\nx = \"1e-3*sin(0.39269908169872414*x)\"\n[solve.explicit]\nduration = 200\noutputs = 1";
+    let rest = "[initial.wave.velocity]\nx = \"1e-3*sin(0.39269908169872414*x)\"\n[solve.explicit]\nduration = 200\noutputs = 1\nstep-fraction = 0.5";
     for more in ["", ", critical-stretch = 0.5"] {
         for law in [
             "lps = { youngs-modulus = 1, poisson-ratio = 0.18",
@@ -60,7 +60,7 @@ fn triangles_move_and_keep_their_energy_below_the_pairwise_ratio_and_when_bonds_
             let all = of("kinetic_energy") + of("stored_energy");
             // half of 1e-6 sin² over the plate; elements of 2 leave 1.3 % of it in the mean of their nodes
             assert!((all / 6.4e-5 - 1.0).abs() < 0.05, "{material}: {all}");
-            // the time step, 0.95 of the stable one, leaves 0.9 % of the energy at that moment; what runs away leaves more by powers of ten
+            // the time step, half of the stable one, leaves 0.8 % of the energy at that moment; what runs away leaves more by powers of ten
             assert!(
                 of("missing_energy").abs() < 0.02 * all,
                 "{material}: {motion}"

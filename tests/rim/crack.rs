@@ -80,3 +80,30 @@ fn a_crack_in_the_zone_opens_as_in_a_plate_of_points() {
     println!("opening {own}, of points {points}: {}", own / points - 1.0);
     assert!((own / points - 1.0).abs() < 0.02, "{own} {points}");
 }
+
+#[test]
+fn elements_as_large_as_the_zone_is_high_do_not_bridge_its_crack() {
+    let (middle, tip) = (0.5 * SIZE, 24.0);
+    let notched = |scene: SceneBuilder| {
+        let notch = Region::segment([-1.0, middle], [tip, middle]);
+        let scene = scene
+            .crack("notch", notch)
+            .probe("above", [0.5, middle + BESIDE])
+            .probe("below", [0.5, middle - BESIDE]);
+        let solution = scene.solve(&Silent).unwrap();
+        let uy = solution.table("probes").unwrap().column("uy").unwrap();
+        uy[uy.len() - 2] - uy[uy.len() - 1]
+    };
+    let points = notched(plate(1.0).coupling("nonlocal"));
+    for (edge, half, shift) in [(5.0, 3.2, 0.1), (4.0, 4.2, 0.4)] {
+        let zone = Region::cuboid([-1.0, middle - half], [tip + 6.0, middle + half]);
+        let with_rim = plate(edge)
+            .nonlocal(zone)
+            .set("peridynamics.points.lattice.origin", [0.5, 0.5 + shift])
+            .set("zones.rim", "own")
+            .coupling("truncated");
+        let own = notched(with_rim);
+        println!("opening {own}, of points {points}: {}", own / points - 1.0);
+        assert!((own / points - 1.0).abs() < 0.1, "{own} {points}");
+    }
+}

@@ -1,7 +1,7 @@
 //! Symmetry, rigid motions, masses and energies of models with a rim.
 
 use bondline::run::LinearModel;
-use bondline::{Condition, Function, Initial, Material, SceneBuilder, Silent};
+use bondline::{Condition, Function, Initial, Material, Region, SceneBuilder, Silent};
 
 use super::meshes::{Body, Random};
 use super::{Drawn, scene, zone};
@@ -156,6 +156,24 @@ fn truncated_bonds_are_symmetric_with_the_rigid_motions_alone_free() {
                 &format!("solid {name}"),
             );
         }
+    }
+}
+
+#[test]
+fn solids_whose_surface_cuts_the_zone_off_the_lattice_turn_without_force() {
+    for (name, law) in [
+        ("bonds", Material::bond_based(1.0)),
+        ("0.3", Material::lps(1.0, 0.3)),
+    ] {
+        let solid = Body::<3> {
+            size: [8.0; 3],
+            edge: 2.7,
+            seed: 614,
+        };
+        let zone = Region::cuboid([2.3, 2.3, 4.9], [5.7, 5.7, 9.0]);
+        let scene = truncated(&solid, law, Drawn::Box).nonlocal(zone);
+        assert_symmetric_and_stiff::<3>(&scene, &format!("cut solid {name}"));
+        assert_masses(&scene, &solid);
     }
 }
 

@@ -18,7 +18,7 @@
 //! corner leave exactly `−R` there. It is symmetric, sparse, and moves no force but along edges. Its sign depends on the field, so that
 //! a model with strings is definite only if its matrix is ([`super::super::Definiteness::EdgeTerms`]).
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::{
     bond_segments::Segments,
@@ -82,8 +82,26 @@ impl<const D: usize> EdgeCorrection<D> {
             for lattice in 0..segments.passing.whole.len() {
                 strings.add_lattice(segments, lattice);
             }
+            strings.drop_open(segments);
         }
         strings
+    }
+
+    /// Drops the frames of zones that a surface off the planes of the lattice cuts: open there, they would turn under a rotation. Octopoles are left at their corners.
+    fn drop_open(&mut self, segments: &Segments<'_, D>) {
+        let model = segments.model;
+        let cut = model.mesh.embedded.pieces.keys();
+        let nodes = cut.flat_map(|&c| model.mesh.corners(c as usize));
+        let sites = nodes.flat_map(|&n| model.node_transfer.row(n as usize).map(|(s, _)| s));
+        let mut rest: Vec<u32> = sites.collect();
+        let mut open = HashSet::new();
+        while let Some(site) = rest.pop() {
+            if open.insert(site) {
+                let strings = self.of_site.get(&site).into_iter().flatten();
+                rest.extend(strings.flat_map(|&s| self.list[s as usize].sites));
+            }
+        }
+        self.of_site.retain(|site, _| !open.contains(site));
     }
 
     fn add_lattice(&mut self, segments: &Segments<'_, D>, lattice: usize) {
@@ -160,7 +178,7 @@ impl<const D: usize> EdgeCorrection<D> {
 
     /// Returns true if there are no strings.
     pub fn is_empty(&self) -> bool {
-        self.list.is_empty()
+        self.of_site.is_empty()
     }
 
     /// Returns true if a string ends at a site.

@@ -7,8 +7,10 @@ use rustc_hash::FxHashSet;
 use super::{
     cells::{Face, Index, PatchCells, block},
     cuts::Cuts,
+    linear::Linear,
     moments::PartMoments,
     rows::{Place, Rows},
+    sides::Sides,
     surface::PatchSurface,
 };
 use crate::{
@@ -41,20 +43,27 @@ pub struct Patched<const D: usize> {
     /// Cells of the rim.
     pub rim: usize,
     /// Cells of second order that became linear.
-    pub linear: usize,
+    pub linear: Linear,
 }
 
 /// A mesh with its patch, but for the nodes that follow others.
-pub(super) struct Composite<const D: usize> {
+pub(super) struct Composite<'s, const D: usize> {
     patched: Patched<D>,
-    /// New numbers of the nodes of the mesh; [`NONE`] where none of its cells is left.
+    /// The mesh before with a node for each side of the patch.
+    sides: &'s Sides<D>,
+    /// New numbers of its nodes; [`NONE`] where none of its cells is left.
     node: Vec<u32>,
     /// Numbers of the nodes of the patch.
     node_of_patch: BTreeMap<Index<D>, u32>,
 }
 
-impl<const D: usize> Composite<D> {
-    pub fn new(before: &Mesh<D>, patch: &PatchCells<D>, cuts: &Cuts) -> Self {
+impl<'s, const D: usize> Composite<'s, D> {
+    // One function: cells and nodes are numbered in the order in which they are added.
+    pub fn new(
+        (before, sides): (&Mesh<D>, &'s Sides<D>),
+        patch: &PatchCells<D>,
+        cuts: &Cuts,
+    ) -> Self {
         let mut mesh = Mesh::<D> {
             notes: before.notes.clone(),
             ..Mesh::default()
@@ -62,11 +71,12 @@ impl<const D: usize> Composite<D> {
         let left: Vec<u32> = (0..before.cell_count() as u32)
             .filter(|&c| !cuts.is_covered(c))
             .collect();
-        let mut node = vec![NONE; before.nodes.len()];
-        for &n in left.iter().flat_map(|&c| before.cell(c as usize)) {
+        let mut node = vec![NONE; sides.mesh.nodes.len()];
+        for &n in left.iter().flat_map(|&c| sides.mesh.cell(c as usize)) {
             node[n as usize] = 0;
         }
-        for (number, x) in node.iter_mut().zip(&before.nodes).filter(|n| *n.0 == 0) {
+        let all = node.iter_mut().zip(&sides.mesh.nodes);
+        for (number, x) in all.filter(|n| *n.0 == 0) {
             *number = mesh.nodes.len() as u32;
             mesh.nodes.push(*x);
         }
@@ -99,7 +109,7 @@ impl<const D: usize> Composite<D> {
             if let Some(rule) = cuts.rule(c) {
                 mesh.embedded.cut.insert(origin.len() as u32, rule.clone());
             }
-            let nodes: Vec<u32> = (before.cell(c as usize).iter())
+            let nodes: Vec<u32> = (sides.mesh.cell(c as usize).iter())
                 .map(|&n| node[n as usize])
                 .collect();
             mesh.push_cell(before.shapes[c as usize], &nodes);
@@ -109,17 +119,18 @@ impl<const D: usize> Composite<D> {
         let mut composite = Self {
             patched: Patched {
                 rim: patch.all.len() - patch.zone.len(),
-                linear: 0,
+                linear: Linear::default(),
                 mesh,
                 nonlocal,
                 origin,
                 covered: FxHashSet::default(),
                 torn: FxHashSet::default(),
                 crossed: FxHashSet::default(),
-                dropped: (0..node.len() as u32)
+                dropped: (0..before.nodes.len() as u32)
                     .filter(|&n| node[n as usize] == NONE)
                     .collect(),
             },
+            sides,
             node,
             node_of_patch,
         };
@@ -155,19 +166,23 @@ impl<const D: usize> Composite<D> {
                 Some(_) => {}
             }
         }
-        let renumbered = |facet: &Facet| -> Vec<u32> {
-            let corners = facet_corners::<D>(facet).iter();
-            corners.map(|&n| self.node[n as usize]).collect()
+        let renumbered = |cell: u32, facet: &Facet| -> Vec<u32> {
+            let corners = self.sides.of_cell(before, cell, facet_corners::<D>(facet));
+            corners.iter().map(|&n| self.node[n as usize]).collect()
         };
-        let mut lost: BTreeSet<Vec<u32>> = (before.boundary_facets(left.iter().copied()))
-            .iter()
-            .map(|facet| sorted(renumbered(&facet.nodes)))
+        // also those between sides of the patch, which it covers
+        let cut_off = (self.sides.mesh).boundary_facets(left.iter().copied());
+        let mut lost: BTreeSet<Vec<u32>> = (cut_off.iter())
+            .map(|facet| {
+                let corners = facet_corners::<D>(&facet.nodes).iter();
+                sorted(corners.map(|&n| self.node[n as usize]).collect())
+            })
             .collect();
         for facet in before.outer_facets() {
-            lost.remove(&sorted(renumbered(&facet.nodes)));
+            lost.remove(&sorted(renumbered(facet.cell, &facet.nodes)));
         }
         for (corners, facet) in &surface.met {
-            let own: Facet = corners.iter().map(|&n| self.node[n as usize]).collect();
+            let own: Facet = renumbered(facet.cell, corners);
             match facet.is_gone {
                 true => embedded.hide(&own),
                 false => embedded.cut_facet_to(&own, facet.left.rule()),
@@ -217,10 +232,11 @@ impl<const D: usize> Composite<D> {
             let all = of_patch.map(|c| c as u32).chain(own).collect();
             mesh.cell_sets.insert(name.clone(), all);
         }
-        let kept = |n: &u32| (self.node[*n as usize] != NONE).then_some(self.node[*n as usize]);
+        let kept = |n: u32| (self.node[n as usize] != NONE).then_some(self.node[n as usize]);
         for (name, set) in &before.node_sets {
+            let all = set.iter().flat_map(|&n| self.sides.copies(n));
             mesh.node_sets
-                .insert(name.clone(), set.iter().filter_map(kept).collect());
+                .insert(name.clone(), all.filter_map(kept).collect());
         }
     }
 
@@ -251,13 +267,12 @@ impl<const D: usize> Composite<D> {
                 }
                 let is_gone = found.is_some_and(|found| found.is_gone)
                     || (owner.get(&corners)).is_some_and(|&c| cell[c as usize] == NONE);
-                own.extend(
-                    facet
-                        .iter()
-                        .map(kept)
-                        .collect::<Option<Facet>>()
-                        .filter(|_| !is_gone),
-                );
+                let nodes = match owner.get(&corners) {
+                    Some(&cell) => self.sides.of_cell(before, cell, facet),
+                    None => facet.clone(),
+                };
+                let nodes: Option<Facet> = nodes.iter().map(kept).collect();
+                own.extend(nodes.filter(|_| !is_gone));
             }
             for (face, part) in faces {
                 if part < (1.0 - HELD) * size {

@@ -36,19 +36,13 @@ pub enum PatchError {
         /// Position of the node \[m\].
         position: Vec<f64>,
     },
-    /// A cell of second order that the patch meets has curved sides.
+    /// An element reaches from one side of the patch to another.
     #[error(
-        "cell {cell}, a {shape:?}, meets the zone or its rim at {position:?}, where it has to be linear, and its side is not straight: a node lies {distance:.1e} of the edge from the middle; straighten the sides there, or keep the zone away from curved elements"
+        "the element at {position:?} reaches from one side of the zone with its rim to another, past cracks or bonds that may break; refine the mesh there, or make the zone larger"
     )]
-    Curved {
-        /// Number of the cell.
-        cell: usize,
-        /// Its shape.
-        shape: CellShape,
-        /// Position of the node \[m\].
+    Spans {
+        /// Its centroid \[m\].
         position: Vec<f64>,
-        /// Its distance from the middle over the length of the edge.
-        distance: f64,
     },
     /// Nodes at the rim follow one another.
     #[error(
@@ -109,7 +103,7 @@ impl PatchError {
             | Self::Large { .. }
             | Self::Grown
             | Self::Torn { .. }
-            | Self::Curved { .. }
+            | Self::Spans { .. }
             | Self::Kind { .. }
             | Self::Materials { .. } => None,
         }

@@ -38,7 +38,9 @@ pub(super) fn of_mesh<const D: usize>(
         let (mut seen, mut reached) = (vec![n], vec![n]);
         for _ in 0..RINGS {
             let had = best.is_some();
-            let mut ring: Vec<u32> = reached.iter().flat_map(|&n| cells(n)).copied().collect();
+            let ring = reached.iter().flat_map(|&n| cells(n)).copied();
+            // through the material, not through the patch
+            let mut ring: Vec<u32> = ring.filter(|&c| !cuts.is_covered(c)).collect();
             ring.sort_unstable();
             ring.dedup();
             for &c in ring.iter().filter(|&&c| cuts.is_good(c)) {

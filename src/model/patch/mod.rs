@@ -3,9 +3,11 @@
 //! | file | content |
 //! |---|---|
 //! | `cells.rs` | cells of the zone, the rim around them, and the faces Γ of the rim |
+//! | `linear.rs` | cells of second order that the patch meets, linear with straight sides |
 //! | `cuts.rs` | elements that Γ cuts: what is left of them |
 //! | `tie.rs` | the displacement of the nodes of Γ, by a dual mortar |
 //! | `followers.rs` | nodes that no good element holds |
+//! | `sides.rs` | nodes inside the patch that elements on different sides share |
 //! | `left.rs` | what is left of cut cells, as simplices |
 //! | `surface.rs` | facets at the surface of the body that the patch covers |
 //! | `moments.rs`, `rows.rs`, `error.rs` | shared: moments of parts, rows of nodes that follow, errors |
@@ -28,22 +30,19 @@ mod cuts;
 mod error;
 mod followers;
 mod left;
+mod linear;
 mod moments;
 mod rows;
+mod sides;
 mod surface;
 mod tie;
 
-pub use self::{composite::Patched, error::PatchError, left::Left};
+pub use self::{composite::Patched, error::PatchError, left::Left, linear::Linear};
 
-use std::{borrow::Cow, collections::BTreeMap};
+use std::collections::BTreeMap;
 
-use self::{cells::PatchCells, composite::Composite, cuts::Cuts, rows::Place};
-use crate::{
-    fem,
-    mesh::Mesh,
-    model::{seam_order, simplex::Cells},
-    tensor::Vector,
-};
+use self::{cells::PatchCells, composite::Composite, cuts::Cuts, rows::Place, sides::Sides};
+use crate::{fem, mesh::Mesh, model::simplex::Cells, tensor::Vector};
 
 /// Lattice of a patch.
 #[derive(Clone, Copy, Debug)]
@@ -60,6 +59,8 @@ pub struct PatchLattice<const D: usize> {
     pub within: (Vector<D>, Vector<D>),
     /// True if the body moves: every node then needs a mass.
     pub has_masses: bool,
+    /// True if cracks may part the zone: no element may then reach from one side of it to another.
+    pub may_part: bool,
 }
 
 impl<const D: usize> PatchLattice<D> {
@@ -94,7 +95,7 @@ pub fn embed<const D: usize>(
     for _ in 0..ABSORBED {
         patch.check_materials(material)?;
         patch.check_connected(mesh)?;
-        let found = embedded(mesh, &patch, is_held, lattice.has_masses);
+        let found = embedded(mesh, &patch, is_held, lattice);
         let Err(error) = &found else {
             return found;
         };
@@ -103,7 +104,7 @@ pub fn embed<const D: usize>(
             return found;
         }
     }
-    embedded(mesh, &patch, is_held, lattice.has_masses)
+    embedded(mesh, &patch, is_held, lattice)
 }
 
 /// Strips of elements that a rim takes in, at most.
@@ -114,26 +115,31 @@ fn embedded<const D: usize>(
     mesh: &Mesh<D>,
     patch: &PatchCells<D>,
     is_held: &dyn Fn(u32) -> bool,
-    has_masses: bool,
+    lattice: PatchLattice<D>,
 ) -> Result<Patched<D>, PatchError> {
-    let (mesh, linear) = linear_at(mesh, patch)?;
+    let (mesh, linear) = linear::linear_at(mesh, patch);
     let mesh = mesh.as_ref();
     let cuts = Cuts::new(mesh, patch)?;
-    let mut rows = followers::of_mesh(mesh, &cuts, is_held)?;
+    if lattice.may_part {
+        sides::check_elements(mesh, patch, &cuts)?;
+    }
+    let sides = Sides::new(mesh, patch, &cuts);
+    let is_held = |n: u32| is_held(sides.origin(n));
+    let mut rows = followers::of_mesh(&sides.mesh, &cuts, &is_held)?;
     rows.extend(followers::of_rim(patch)?);
-    let tied = tie::rows(mesh, patch, &cuts);
+    let tied = tie::rows(&sides.mesh, patch, &cuts);
     let (mut all, mut shares) = (rows.clone(), rows);
     for (node, own) in tied {
         all.insert(Place::Patch(node), own.row);
         shares.insert(Place::Patch(node), own.share);
     }
-    let composite = Composite::new(mesh, patch, &cuts);
+    let composite = Composite::new((mesh, &sides), patch, &cuts);
     let all = followers::resolved(&all, patch)?;
     let shares = followers::resolved(&shares, patch)?;
     let mut patched = composite.with_followers(&all, &shares);
     if lightest(&patched, &patched.mesh.embedded.followers).is_none() {
         patched.mesh.embedded.shares.clear();
-    } else if has_masses
+    } else if lattice.has_masses
         && let Some((n, volume)) = lightest(&patched, &patched.mesh.embedded.shares)
     {
         return Err(PatchError::Mass {
@@ -142,36 +148,6 @@ fn embedded<const D: usize>(
         });
     }
     Ok(Patched { linear, ..patched })
-}
-
-/// The mesh with linear cells instead of those of second order that the patch meets, and how many there are.
-fn linear_at<'m, const D: usize>(
-    mesh: &'m Mesh<D>,
-    patch: &PatchCells<D>,
-) -> Result<(Cow<'m, Mesh<D>>, usize), PatchError> {
-    if !mesh.has_quadratic_cells() {
-        return Ok((Cow::Borrowed(mesh), 0));
-    }
-    let mut is_met = vec![false; mesh.cell_count()];
-    for index in &patch.all {
-        for &(c, _) in &patch.held[index] {
-            is_met[c as usize] |= mesh.shapes[c as usize].is_quadratic();
-        }
-    }
-    for c in (0..is_met.len()).filter(|&c| is_met[c]) {
-        if let Some((x, distance)) = seam_order::bent_side(mesh, c) {
-            return Err(PatchError::Curved {
-                cell: c,
-                shape: mesh.shapes[c],
-                position: x.iter().copied().collect(),
-                distance,
-            });
-        }
-    }
-    let mut linear = mesh.clone();
-    linear.linearise(|c| is_met[c]);
-    let count = is_met.iter().filter(|is| **is).count();
-    Ok((Cow::Owned(linear), count))
 }
 
 /// A node of elements that follows none and has no positive volume, if there is one, where nodes that follow hand theirs on by these rows.

@@ -29,6 +29,8 @@ const NOTHING: f64 = 1e-9;
 
 /// A facet of which the patch covers a part.
 pub(super) struct MetFacet<const D: usize> {
+    /// Its cell.
+    pub cell: u32,
     /// Faces of the patch on it, with the size that they have in common.
     pub faces: Vec<(Face<D>, f64)>,
     /// The rest of it.
@@ -119,6 +121,7 @@ impl<const D: usize> PatchSurface<D> {
             self.faces.entry(*face).or_insert_with(about).join(part);
         }
         let found = MetFacet {
+            cell: facet.cell,
             faces: (faces.into_iter())
                 .map(|(face, part)| (face, part.size))
                 .collect(),
