@@ -61,9 +61,7 @@ impl<const D: usize> BodyState for CoupledSystem<'_, D> {
     fn damage_at_edge(&self) -> Option<usize> {
         let body = self.body.as_ref()?;
         if let Some(seam) = &self.seam {
-            let pass = body.pass.as_ref();
-            let beside = || seam.softened_beside(pass).filter(|_| body.softens);
-            let point = seam.damaged_at_face(pass).or_else(beside)?;
+            let point = seam.damaged_at_face(body.pass.as_ref())?;
             return Some(body.site_of_point[point as usize] as usize);
         }
         // asked for after every pass that broke a bond: only the points at the edge are looked at

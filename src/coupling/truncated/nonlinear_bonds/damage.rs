@@ -81,16 +81,6 @@ impl<const D: usize> NonlinearSeam<D> {
             .map(|[i, _]| *i)
     }
 
-    /// A point whose bonds the seam cuts and of which a whole one has softened through: the cut ones break at once, at a higher load.
-    pub(in crate::coupling) fn softened_beside(&self, pass: &dyn BondPass<D>) -> Option<u32> {
-        let mut points = self.lost.chunk_by(|a, b| a.0 == b.0).map(|of| of[0].0);
-        points.find(|&p| {
-            let p = p as usize;
-            let mut others = self.families.of(p).iter();
-            pass.is_damaged(p) && others.any(|&j| !pass.bonded(p, j as usize))
-        })
-    }
-
     /// Bits of the bonds that stand.
     pub(in crate::coupling) fn damage_state(&self) -> Vec<u64> {
         pack(&self.intact, self.bonds.len() as u64)
