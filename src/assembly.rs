@@ -119,18 +119,6 @@ pub struct Counted {
     pub of_points: u16,
 }
 
-impl Counted {
-    // rare, and out of the loops over families, which it would slow down by a third
-    #[inline(never)]
-    fn part_between(self, ends: [Option<&u16>; 2]) -> f64 {
-        let part = |end: Option<&u16>| match *end.unwrap_or(&self.of_points) == self.material {
-            true => 0.5,
-            false => 0.0,
-        };
-        part(ends[0]) + part(ends[1])
-    }
-}
-
 const EMPTY: u32 = u32::MAX;
 
 /// Elements that a row remembers: some rows of a mesh in the plane.
@@ -167,10 +155,12 @@ impl<const D: usize> Row<D> {
     /// Part of a bond that counts, by the materials of its ends; none of a body of one.
     #[inline]
     pub fn part_between(&self, ends: [Option<&u16>; 2]) -> f64 {
-        match self.counted {
-            None => 1.0,
-            Some(counted) => counted.part_between(ends),
-        }
+        let Some(counted) = self.counted else {
+            return 1.0;
+        };
+        let is_its = |end: Option<&u16>| *end.unwrap_or(&counted.of_points) == counted.material;
+        let counting = ends.into_iter().filter(|end| is_its(*end));
+        0.5 * counting.count() as f64
     }
 
     /// Calls `add` with each block of the row of a local node in the stiffness of an element of the one model that the row is for; `stiffness` is asked where the element is not remembered.
