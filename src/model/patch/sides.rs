@@ -1,6 +1,6 @@
 //! Nodes inside a patch that elements on different sides of it share: each side gets a node of its own.
 //!
-//! What is left of two elements around such a node hangs together if a part of a facet with the node is left between them. Where it does not, the shared node would carry displacements through the zone: past a crack, that is a bridge.
+//! The parts that are left of two elements around such a node hang together if a part of a facet with the node is left between them. Otherwise the shared node would carry displacements through the zone: past a crack, that is a bridge.
 
 use super::{
     cells::{Index, PatchCells, block},

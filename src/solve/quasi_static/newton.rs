@@ -157,7 +157,7 @@ impl Run<'_> {
             (Tangent::Present, Some(_)) => {
                 known.or_else(|| self.system.element_tangent(u, self.interval))
             }
-            _ => None,
+            (Tangent::AtRest, _) | (Tangent::Present, None) => None,
         };
         if known.is_none() {
             self.leave_out_broken();

@@ -14,7 +14,7 @@ const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
 /// The least residual, relative to all forces, that is asked for: differences of the lengths of bonds know no more.
 pub const TIGHTEST: f64 = 1e-10;
 
-/// Tolerance of states of equilibrium between breaking bonds, where that of the load step is finer. A notched plate that breaks through within a load step then has the bonds, the work and the energies of 1e-8 to four digits.
+/// Tolerance of states of equilibrium between breaking bonds, where that of the load step is finer: of such a state only the bonds beyond their stretch are asked for, and the last is found to that of the load step.
 const BETWEEN: f64 = 1e-5;
 
 /// Largest part of a load that round-off may leave: a body that nothing holds moves until round-off hides any load.
