@@ -23,3 +23,10 @@ impl BondChanges {
         *self == Self::default()
     }
 }
+
+impl std::ops::AddAssign for BondChanges {
+    fn add_assign(&mut self, other: Self) {
+        self.broken += other.broken;
+        self.softened += other.softened;
+    }
+}

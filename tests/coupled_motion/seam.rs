@@ -7,7 +7,10 @@ use super::{
 use bondline::system::BodyState;
 use bondline::{
     model::SiteKind,
-    peridynamics::{Influence, Micromodulus, bond_force::BondKinematics},
+    peridynamics::{
+        Influence, Micromodulus,
+        bond_force::{BondKinematics, BondSoftening},
+    },
     system::{BodyHistory, FailureUpdate, Halfway, Interval, SemiDiscrete, Symmetry, Tangent},
     tensor::Vector,
 };
@@ -27,6 +30,17 @@ fn breaking_at_the_seam() -> Case {
 /// Bonds that share dilatations, above the pairwise Poisson ratio.
 fn breaking_states_at_the_seam() -> Case {
     case(Method::Truncated, Law::StateBased(Influence::Gaussian))
+}
+
+/// Bonds that soften from `critical`/√3 to √3 `critical`.
+fn softening(kinematics: BondKinematics, critical: f64) -> BondBehaviour<'static, 2> {
+    BondBehaviour {
+        softening: Some(BondSoftening {
+            ratio: 3.0,
+            tolerance: 0.0,
+        }),
+        ..behaviour(kinematics, Some(critical))
+    }
 }
 
 /// Asserts that a force is the gradient of the stored energy, at about a hundred of the unknowns, by differences over twice a step.
@@ -89,6 +103,59 @@ fn random<const D: usize>(enclosed: &Enclosed<D>, size: f64) -> Vec<f64> {
     let mut numbers = Numbers(17);
     let unknowns = 0..enclosed.model.sites.len() * D;
     unknowns.map(|_| size * numbers.draw()).collect()
+}
+
+#[test]
+fn bonds_of_a_seam_that_soften_have_one_energy_and_spend_what_they_lose() {
+    for case in [breaking_at_the_seam(), breaking_states_at_the_seam()] {
+        for kinematics in [BondKinematics::Linear, BondKinematics::Exact] {
+            with_motion::<2, _>(&case, &softening(kinematics, 0.002), |enclosed, motion| {
+                let amplitude = 0.001;
+                let wave = wave(enclosed, amplitude);
+                let mut force = vec![0.0; wave.len()];
+                let mut spent = 0.0;
+                // on, back through zero, so that bonds past the onset close, and on again
+                for part in [0.6, 1.0, -0.3, 0.01, 1.4, 2.5] {
+                    let u: Vec<f64> = wave.iter().map(|u| part * u).collect();
+                    let before = motion.stored_energy(&u);
+                    let changes = motion.internal_force_into(
+                        &u,
+                        &mut force,
+                        Interval::AT_ONCE,
+                        FailureUpdate::Update,
+                    );
+                    motion.account_for_breaks(&Halfway::at(&u));
+                    let taken = motion.dissipation().unwrap().total() - spent;
+                    let lost = before - motion.stored_energy(&u);
+                    // a bond that closes has all of its pair force again, until it opens
+                    if part > 0.1 {
+                        assert!(changes.softened > 0, "{part}");
+                        let off = (lost - taken).abs();
+                        assert!(off < 1e-9 * before, "{part}: {lost:e} {taken:e}");
+                    }
+                    spent += taken;
+                    is_gradient(motion, &u, &force, 1e-4 * amplitude);
+                    let sites = vec![Vector::<2>::zeros(); u.len() / 2];
+                    let (sums, _) = out_of_balance(&sites, &force);
+                    assert!(sums < 1e-12, "{part}: {sums:e}");
+                    // kept in a checkpoint, to the last bit
+                    let state = motion.damage_state();
+                    assert!(!motion.restore_damage(&state[1..]));
+                    assert!(motion.restore_damage(&state));
+                    assert_eq!(motion.damage_state(), state);
+                    let mut again = vec![0.0; u.len()];
+                    motion.internal_force_into(
+                        &u,
+                        &mut again,
+                        Interval::AT_ONCE,
+                        FailureUpdate::Frozen,
+                    );
+                    assert_eq!(again, force, "{part}");
+                }
+                assert!(spent > 0.0);
+            });
+        }
+    }
 }
 
 #[test]

@@ -156,3 +156,63 @@ fn what_softening_bonds_cannot_do_is_refused_by_name() {
         "must lie between",
     );
 }
+
+/// A plate with a crack whose tips lie two horizons from the seam.
+const CRACKED: &str = r#"
+kinematics = "plane-stress"
+[mesh.rectangle]
+min = [-20, -20]
+max = [20, 20]
+x = { spacing = 2 }
+y = { spacing = 2 }
+[materials.glass.lps]
+youngs-modulus = 70e3
+poisson-ratio = 0.3
+fracture-energy = 0.01
+[peridynamics]
+horizon = 3
+points.lattice = { spacing = 1 }
+[zones]
+nonlocal.box = { min = [-12, -6], max = [12, 6] }
+damage-at-edge = "warn"
+[cracks.start]
+segment = { from = [-5.5, 0], to = [5.5, 0] }
+[conditions.foot.displacement]
+inside.ball = { center = [0, -20], radius = 0.6 }
+x = 0
+[conditions.bottom.displacement]
+on = "bottom"
+y = 0
+[conditions.top.displacement]
+on = "top"
+y = "5e-3 * t"
+[solve.quasi-static]
+steps = [0.6, 0.7, 0.74, 0.76, 0.78, 0.8, 0.82, 0.84, 0.86]
+[output]
+vtu = false
+"#;
+
+#[test]
+fn a_crack_runs_up_to_the_seam_at_the_load_of_its_energy() {
+    let folder = tempfile::tempdir().unwrap();
+    let motion = |coupling: &str| {
+        let typed = format!("coupling = \"{coupling}\"\n{CRACKED}");
+        summary(folder.path(), &typed)["motion"].clone()
+    };
+    let whole = motion("nonlocal");
+    assert_eq!(whole["ended"], "parted");
+    let at = whole["time"].as_f64().unwrap();
+    // bonds that break at once beside the seam hold the crack up to 1.28 times the displacement
+    let coupled = motion("truncated");
+    let until = coupled["edge_reached"][0].as_f64().unwrap();
+    assert!(until < 1.1 * at, "{until} {at}");
+}
+
+#[test]
+fn a_crack_at_a_seam_goes_on_from_its_checkpoint() {
+    let typed = CRACKED.replace(
+        "steps = [0.6, 0.7, 0.74,",
+        "checkpoint-every = 2\nsteps = [0.6, 0.7, 0.74,",
+    );
+    crate::resumes_with_the_same_bytes(&format!("coupling = \"truncated\"\n{typed}"));
+}

@@ -82,7 +82,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
                     critical.at(lattice, [material(i), material(j)])
                 };
                 let never = |p: u32| (behaviour.no_fail)(&cloud.position[p as usize]);
-                seam.let_break(model, body, critical, never);
+                seam.let_break(model, body, (critical, behaviour.softening), never);
             }
         }
         let is_exact_seam = seam.is_some();
@@ -177,9 +177,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
             return body.pass.restore_damage(state);
         };
         let held = seam.damage_state();
-        // that of the pass grows as bonds soften
-        let of_pass = state.len().checked_sub(held.len());
-        let Some((of_pass, of_seam)) = of_pass.map(|of_pass| state.split_at(of_pass)) else {
+        let Some((of_pass, of_seam)) = seam.split_state(state) else {
             return false;
         };
         if !seam.restore_damage(of_seam) {
@@ -190,6 +188,7 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
             // nothing is changed by a state that does not belong here
             seam.restore_damage(&held);
         }
+        seam.recall(body.pass.as_ref());
         fits
     }
 

@@ -30,7 +30,7 @@ impl<const D: usize> CoupledSystem<'_, D> {
     /// The same of the bonds that are counted here, where processes move their own sites.
     pub(super) fn lost_here(&self, at: &Halfway<'_>) -> LostToBreaks {
         let mut lost = self.lost_by_pass(at);
-        if let Some(seam) = self.seam.as_ref().filter(|seam| seam.has_broken()) {
+        if let Some(seam) = self.seam.as_ref().filter(|seam| seam.has_changed()) {
             seam.add_lost_energy(&at.all(), &mut lost.energy);
             for (bond, share) in seam.last_own() {
                 lost.area.add(share * self.area_of(bond));

@@ -8,7 +8,8 @@ use super::reached_sites::Reached;
 use super::rows::SiteRows;
 use super::{CoupledSystem, behaviour::NONE, body::MovingBody, split::Split};
 use crate::system::{
-    FailureUpdate, Ghosts, Halfway, LostToBreaks, Segments, SharedSteps, Spread, Traffic,
+    BondChanges, FailureUpdate, Ghosts, Halfway, LostToBreaks, Segments, SharedSteps, Spread,
+    Traffic,
 };
 use crate::tensor::Vector;
 use crate::{parallel, peridynamics::bond_force::Reach};
@@ -228,10 +229,8 @@ impl<const D: usize> SharedSteps for CoupledSystem<'_, D> {
             let scale = forces.scale.take();
             forces.put_all(segments, (products, of_points), force);
             seam.begin_pass();
-            if follows {
-                seam.follow(pass.as_ref());
-            }
-            broken += seam.add_force(u, force, update);
+            seam.follow(pass.as_ref(), BondChanges::broken(u64::from(follows)));
+            broken += seam.add_force(u, force, update).broken;
             steps.untold_at_seam.extend(seam.broken_here());
             scale_own::<D>(scale, &steps.own, force);
             ghosts.begin(force);
@@ -291,7 +290,8 @@ impl<const D: usize> SharedSteps for CoupledSystem<'_, D> {
         if let Some(seam) = &mut self.seam {
             let untold = std::mem::take(&mut steps.untold_at_seam);
             seam.take_broken(&split.ranks.gather_words(&untold).concat());
-            seam.follow(body.pass.as_ref());
+            let all = BondChanges::broken(words.len() as u64);
+            seam.follow(body.pass.as_ref(), all);
         }
     }
 

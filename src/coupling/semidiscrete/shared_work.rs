@@ -69,10 +69,8 @@ impl<'a, const D: usize> CoupledSystem<'a, D> {
                 body.add_feet(&body.force, force);
                 if let Some(seam) = &mut self.seam {
                     seam.begin_pass();
-                    if changes.broken > 0 {
-                        seam.follow(body.pass.as_ref());
-                    }
-                    changes.broken += seam.add_force(u, force, update);
+                    seam.follow(body.pass.as_ref(), changes);
+                    changes += seam.add_force(u, force, update);
                 }
             }
         }

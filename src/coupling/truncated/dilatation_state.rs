@@ -213,11 +213,11 @@ impl<const D: usize> States<D> {
         }
     }
 
-    /// `κ F` of the `wanted` dilatations, from the elements' own parts and the elongations of the others.
+    /// `κ F` of the `wanted` dilatations, from the elements' own parts and what each of the others hands over.
     pub fn pressures(
         &self,
         own: &OwnParts<'_, D>,
-        elongation: &[f64],
+        elongation: impl Fn(usize) -> f64 + Sync,
         wanted: impl Fn(usize) -> bool + Sync,
     ) -> Vec<f64> {
         parallel::map(self.count(), 64, |f| {
@@ -225,7 +225,7 @@ impl<const D: usize> States<D> {
                 return 0.0;
             }
             let handed = self.shares_of(f).iter();
-            let handed: f64 = handed.map(|&(p, c)| c * elongation[p as usize]).sum();
+            let handed: f64 = handed.map(|&(p, c)| c * elongation(p as usize)).sum();
             self.stiffness[f] * (own.values[f] + handed)
         })
     }

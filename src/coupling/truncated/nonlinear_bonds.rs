@@ -1,22 +1,24 @@
 //! Bonds at a seam that turn, stretch and break: pieces one by one; whole bonds of a pairwise law are left to the pass over the body.
 //!
 //! A piece of the length s, a fraction of its bond ξ, has the energy `s w(ξ, D/s)`: it is stretched by `|ξ + D/s|/|ξ| − 1`, like the whole bond would be. The pieces of a bond break together, and take `s w` each, when the whole bond
-//! passes the critical stretch: its ends move with their points, or with the elements that they lie in (`breaking.rs`). The elements behind the face keep their classical energy: a crack cannot go on into them.
+//! passes the critical stretch, or soften together from its onset on (`softening.rs`): its ends move with their points, or with the elements that they lie in (`breaking.rs`). The elements behind the face keep their classical energy: a crack cannot go on into them.
 //!
 //! Of an LPS a piece also hands its elongation to dilatations (`dilatation_state.rs`). The energies of the points at the seam, halves of whole bonds and dilatations, are then here too, and the body's pass computes the others;
-//! whole bonds break there, and are reported here.
+//! whole bonds break and soften there, and are reported here.
 
 mod breaking;
 mod construction;
 mod counted_bonds;
 mod damage;
 mod own_bonds;
+mod softening;
 
 use rayon::prelude::*;
 
 use breaking::{Breaking, Carrier};
 use counted_bonds::OwnBonds;
 pub(in crate::coupling) use own_bonds::ReachOfSeam;
+use softening::SeamSoftening;
 
 use super::{
     bond_kinematics::Part,
@@ -29,9 +31,9 @@ use crate::{
     parallel,
     peridynamics::{
         Families, PdBody,
-        bond_force::{BondKinematics, BondPass},
+        bond_force::{BondKinematics, BondSoftening},
     },
-    system::FailureUpdate,
+    system::{BondChanges, FailureUpdate},
     tensor::{Tensor, Vector},
 };
 
@@ -55,10 +57,13 @@ pub struct NonlinearSeam<const D: usize> {
     first: Vec<u32>,
     /// The first bonds break here, the others in the body's pass.
     own: usize,
+    /// Bits of the bonds that have all of their stiffness.
     intact: Vec<u8>,
-    /// Bonds that the last pass broke.
-    last: Vec<u32>,
+    /// Bonds that the last pass took stiffness from, and the part of it.
+    last: Vec<(u32, f64)>,
     breaks: Option<Breaking<D>>,
+    /// Of bonds that soften; none of bonds that break at once.
+    softening: Option<SeamSoftening>,
     kinematics: BondKinematics,
     /// Sites at which parts end, and for each the parts with their weights.
     sites: Vec<u32>,
@@ -84,18 +89,20 @@ impl<const D: usize> NonlinearSeam<D> {
         self.kinematics = kinematics;
     }
 
-    /// Lets bonds break: by the numbers of its points at which stretch, and of a point whether its bonds never do.
+    /// Lets bonds break: by the numbers of its points at which stretch, from which onset on they soften if they do, and of a point whether its bonds never do.
     pub(in crate::coupling) fn let_break(
         &mut self,
         model: &Model<D>,
         body: &PdBody<D>,
-        critical: impl Fn([u32; 2]) -> f64,
+        (critical, softening): (impl Fn([u32; 2]) -> f64, Option<BondSoftening>),
         never: impl Fn(u32) -> bool,
     ) {
-        let limit = |bond| self.kinematics.limit(critical(bond));
+        let first = |s: f64| softening.map_or(s, |law| law.limit(s));
+        let limit = |bond| self.kinematics.limit(first(critical(bond)));
         let longest = |bond| self.longest_piece(bond);
         let bonds = &self.bonds[..self.own];
         self.breaks = Some(Breaking::new((model, body), bonds, limit, never, longest));
+        self.softening = softening.map(|law| SeamSoftening::new(law, self.bonds.len()));
     }
 
     fn longest_piece(&self, bond: usize) -> (f64, Carrier) {
@@ -104,18 +111,6 @@ impl<const D: usize> NonlinearSeam<D> {
         let longest = parts.max_by(|p, q| length(p).total_cmp(&length(q)));
         let longest = longest.expect("a bond of a seam has a piece");
         (length(&longest), self.difference.row(longest).collect())
-    }
-
-    /// Breaks the bonds that are over the limit; returns how many, each counted once for each direction.
-    fn break_bonds(&mut self, u: &[f64]) -> u64 {
-        let Some(breaks) = &self.breaks else { return 0 };
-        let may = |bond| self.stands(bond as u32) && self.computed.knows_bond(bond);
-        let over = breaks.over(self.kinematics, may, u);
-        for &bond in &over {
-            self.intact[bond / 8] &= !(1 << (bond % 8));
-            self.last.push(bond as u32);
-        }
-        2 * self.broken_here().len() as u64
     }
 
     /// The families over which the body's own pass runs.
@@ -131,21 +126,6 @@ impl<const D: usize> NonlinearSeam<D> {
     /// Points whose energy is not for the body's pass; empty for none.
     pub(in crate::coupling) fn without_energy(&self) -> &[bool] {
         &self.without_energy
-    }
-
-    /// Learns from the body's pass which of its bonds stand.
-    pub(in crate::coupling) fn follow(&mut self, pass: &dyn BondPass<D>) {
-        for (bond, [i, j]) in self.bonds.iter().enumerate().skip(self.own) {
-            let bit = 1 << (bond % 8);
-            if self.intact[bond / 8] & bit != 0 && !pass.bonded(*i as usize, *j as usize) {
-                self.intact[bond / 8] &= !bit;
-                self.last.push(bond as u32);
-            }
-        }
-    }
-
-    fn stands(&self, bond: u32) -> bool {
-        self.intact[bond as usize / 8] >> (bond % 8) & 1 == 1
     }
 
     /// Directions in `pulls`, and elongations; zero for parts that do not stand.
@@ -181,15 +161,17 @@ impl<const D: usize> NonlinearSeam<D> {
         let states = self.states.as_ref();
         let pressures = match (states, own) {
             (Some(states), Some(own)) => {
-                states.pressures(own, elongation, |f| self.computed.knows_dilatation(f))
+                let handed = |p: usize| self.left(self.parts[p].bond)[1] * elongation[p];
+                states.pressures(own, handed, |f| self.computed.knows_dilatation(f))
             }
             _ => Vec::new(),
         };
         parallel::for_each_chunk(pulls, CHUNK, 1, |chunk, pulls| {
             for (k, pull) in pulls.iter_mut().enumerate() {
                 let p = chunk * CHUNK + k;
-                let f = self.parts[p].stiffness * elongation[p]
-                    + states.map_or(0.0, |s| s.tension(p, &pressures));
+                let [pair, state] = self.left(self.parts[p].bond);
+                let f = pair * self.parts[p].stiffness * elongation[p]
+                    + states.map_or(0.0, |s| state * s.tension(p, &pressures));
                 *pull = pull.map(|x| f * x);
             }
         });
@@ -218,21 +200,21 @@ impl<const D: usize> NonlinearSeam<D> {
         states.map(|states| states.own_parts(u, kinematics, is_known))
     }
 
-    /// Adds the internal force; returns how many bonds broke, each counted once for each direction.
+    /// Adds the internal force; returns how many bonds broke and softened, each counted once for each direction.
     pub(in crate::coupling) fn add_force(
         &mut self,
         u: &[f64],
         force: &mut [f64],
         breakage: FailureUpdate,
-    ) -> u64 {
+    ) -> BondChanges {
         let (mut pulls, mut elongation, mut sums) = (
             std::mem::take(&mut self.pulls),
             std::mem::take(&mut self.elongation),
             std::mem::take(&mut self.sums),
         );
-        let broken = match breakage {
-            FailureUpdate::Update => self.break_bonds(u),
-            FailureUpdate::Frozen => 0,
+        let changes = match breakage {
+            FailureUpdate::Update => self.update_cut_bonds(u),
+            FailureUpdate::Frozen => BondChanges::default(),
         };
         match self.kinematics {
             BondKinematics::Exact => self.stretch::<true>(u, &mut pulls, &mut elongation),
@@ -243,7 +225,7 @@ impl<const D: usize> NonlinearSeam<D> {
         self.add_forces(&pulls, (own.as_ref(), &pressures), u, &mut sums, force);
         drop(own);
         (self.pulls, self.elongation, self.sums) = (pulls, elongation, sums);
-        broken
+        changes
     }
 
     fn scatter(&self, pulls: &[[f64; D]], sums: &mut Vec<[f64; D]>, force: &mut [f64]) {
@@ -278,9 +260,11 @@ impl<const D: usize> NonlinearSeam<D> {
     fn functional(&self, states: &States<D>, f: usize) -> (f64, Functional<D>) {
         states.at_rest(f, |p, c, b| {
             let part = &self.parts[p];
-            if self.stands(part.bond) {
+            let [_, state] = self.left(part.bond);
+            if state > 0.0 {
                 for (site, w) in self.difference.row(p) {
-                    *b.entry(site).or_insert_with(Vector::zeros) += Vector::from(part.xi) * (c * w);
+                    *b.entry(site).or_insert_with(Vector::zeros) +=
+                        Vector::from(part.xi) * (state * c * w);
                 }
             }
         })
@@ -326,9 +310,10 @@ impl<const D: usize> NonlinearSeam<D> {
         let mut of = Vec::new();
         for &(p, w) in self.ends_at(site) {
             let part = &self.parts[p as usize];
-            if self.stands(part.bond) {
+            let [pair, _] = self.left(part.bond);
+            if pair > 0.0 {
                 let xi = Vector::from(part.xi);
-                let block: Tensor<D> = xi * xi.transpose() * (part.stiffness * w);
+                let block: Tensor<D> = xi * xi.transpose() * (pair * part.stiffness * w);
                 row.add(&self.difference, p as usize, &block);
                 let states = self.states.iter();
                 of.extend(states.flat_map(|s| s.of_part(p as usize).iter().map(|e| e.0)));

@@ -115,7 +115,7 @@ impl<const D: usize> List<D> {
                     Some(c) => {
                         let family = self.offsets[i]..self.offsets[i + 1];
                         let left: f64 = family
-                            .map(|bond| (self.left_of(i, bond), bond))
+                            .map(|bond| (self.left_of(i, bond)[1], bond))
                             .filter(|(left, _)| *left > 0.0)
                             .map(|(left, bond)| left * moments(bond).0)
                             .sum();

@@ -546,9 +546,10 @@ impl<const D: usize> BondPass<D> for Generic<D> {
         lost.add(self.lost(displaced));
     }
 
-    fn bonded(&self, i: usize, j: usize) -> bool {
+    fn left(&self, i: usize, j: usize) -> [f64; 2] {
         let place = self.families.of(i).binary_search(&(j as u32));
-        place.is_ok_and(|k| self.stands(self.range(i).start + k))
+        let stands = place.is_ok_and(|k| self.stands(self.range(i).start + k));
+        [f64::from(u8::from(stands)); 2]
     }
 
     fn damage_state(&self) -> Vec<u64> {

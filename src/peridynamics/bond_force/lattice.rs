@@ -364,31 +364,34 @@ impl<const D: usize> BondPass<D> for Lattice<D> {
         }
     }
 
-    fn bonded(&self, i: usize, j: usize) -> bool {
+    fn left(&self, i: usize, j: usize) -> [f64; 2] {
         let Some(here) = self.cell(i) else {
-            return false;
+            return [0.0; 2];
         };
         let offsets = &self.stencil.offsets;
-        let g = self.place[i] as usize / LANES;
-        let Some(there) = self.cell(j) else {
+        let slot = match self.cell(j) {
+            // a flat distance is that of one step only: rows are padded by the reach of the stencil
+            Some(there) => {
+                let delta = there as isize - here as isize;
+                offsets.iter().position(|o| o.delta == delta)
+            }
             // a point without a family, in elements: it has a cell, but no place
-            let mut is_bonded = false;
-            self.each_left(g, here % LANES, |o, _| {
-                let cell = here as isize + offsets[o].delta;
-                is_bonded |= self.stencil.point_of[cell as usize] == j as u32;
-            });
-            return is_bonded;
+            None => offsets.iter().position(|o| {
+                let there = (here as isize + o.delta) as usize;
+                self.stencil.point_of[there] == j as u32
+            }),
         };
-        let delta = there as isize - here as isize;
-        // a flat distance is that of one step only: rows are padded by the reach of the stencil
-        offsets
-            .iter()
-            .position(|o| o.delta == delta)
-            .is_some_and(|o| {
-                let intact = self.stencil.intact[g * offsets.len() + o];
-                let softened = self.softened.as_ref();
-                intact >> (here % LANES) & 1 == 1 || softened.is_some_and(|s| s.has(i, o as u64))
-            })
+        let Some(slot) = slot else {
+            return [0.0; 2];
+        };
+        let place = self.place[i] as usize;
+        let intact = self.stencil.intact[place / LANES * offsets.len() + slot];
+        if intact >> (place % LANES) & 1 == 1 {
+            return [1.0; 2];
+        }
+        let softened = self.softened.as_ref();
+        let found = softened.and_then(|softened| softened.find(i, slot as u64));
+        found.map_or([0.0; 2], SoftenedBonds::left)
     }
 
     fn damage_state(&self) -> Vec<u64> {

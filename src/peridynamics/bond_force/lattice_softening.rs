@@ -1,6 +1,6 @@
 //! Bonds of a lattice past the onset of softening.
 
-use super::lattice::{Lattice, Solid};
+use super::lattice::Lattice;
 use super::lattice_simd::Broken;
 use super::list::{Stretched, extension, ratio, stretched};
 use super::simd::LANES;
@@ -46,10 +46,7 @@ impl<const D: usize> Lattice<D> {
                 let here = self.stencil.groups[group] as usize + lane;
                 let there = (here as isize + offset.delta) as usize;
                 let ends = [here, there].map(|cell| self.stencil.point_of[cell]);
-                // a seam has the energy of such points, and knows whole bonds only
-                let at_seam = |s: &Solid| s.deviatoric[here] == 0.0 || s.deviatoric[there] == 0.0;
-                let at_once = self.solid.as_ref().is_some_and(at_seam);
-                SoftenedBond::new(ends, slot as u64, law.ends_of(limit, at_once))
+                SoftenedBond::new(ends, slot as u64, law.ends_of(limit))
             };
             let lanes = (0..LANES).filter(move |lane| lanes >> lane & 1 == 1);
             lanes.map(bond)

@@ -489,7 +489,7 @@ impl<const D: usize> BondPass<D> for List<D> {
             for bond in self.offsets[i]..self.offsets[i + 1] {
                 let v = self.volume[self.neighbours.get(i, bond)];
                 all += v;
-                lost += (1.0 - self.left_of(i, bond)) * v;
+                lost += (1.0 - self.left_of(i, bond)[1]) * v;
             }
             *damage = lost / all;
         });
@@ -526,10 +526,10 @@ impl<const D: usize> BondPass<D> for List<D> {
         }
     }
 
-    fn bonded(&self, i: usize, j: usize) -> bool {
+    fn left(&self, i: usize, j: usize) -> [f64; 2] {
         self.neighbours
             .place(i, self.offsets[i]..self.offsets[i + 1], j)
-            .is_some_and(|k| self.stands(i, self.offsets[i] + k))
+            .map_or([0.0; 2], |k| self.left_of(i, self.offsets[i] + k))
     }
 
     fn damage_state(&self) -> Vec<u64> {

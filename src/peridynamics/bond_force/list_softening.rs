@@ -1,6 +1,6 @@
 //! Bonds of a list past the onset of softening.
 
-use super::bond_list::{Limit, List, Solid};
+use super::bond_list::{Limit, List};
 use super::list::{Stretched, extension, ratio, stretched, vector};
 use super::softened_bonds::{SoftenedBond, SoftenedBonds};
 use crate::system::BondChanges;
@@ -26,10 +26,7 @@ impl<const D: usize> List<D> {
                 Limit::PerBond(t) => t[bond],
             };
             let far = self.neighbours.get(i as usize, bond);
-            // a seam has the energy of such points, and knows whole bonds only
-            let at_seam = |s: &Solid| s.deviatoric[i as usize] == 0.0 || s.deviatoric[far] == 0.0;
-            let at_once = self.solid.as_ref().is_some_and(at_seam);
-            let ends = law.ends_of(self.kinematics.stretch(limit), at_once);
+            let ends = law.ends_of(self.kinematics.stretch(limit));
             SoftenedBond::new([i, far as u32], bond as u64, ends)
         });
         let stretch =
@@ -93,22 +90,18 @@ impl<const D: usize> List<D> {
         }
     }
 
-    /// Part of its stiffness that a bond of a point has under tension.
-    pub(super) fn left_of(&self, i: usize, bond: usize) -> f64 {
-        match (self.is_intact(i, bond - self.offsets[i]), &self.softened) {
-            (true, _) => 1.0,
-            (false, None) => 0.0,
-            (false, Some(softened)) => {
-                let mut of_point = softened.of(i).iter();
-                let found = of_point.find(|b| b.slot == bond as u64);
-                found.map_or(0.0, SoftenedBonds::left_in_tension)
-            }
+    /// Parts of its stiffness that a bond of a point has, as [`SoftenedBonds::left`] gives them.
+    pub(super) fn left_of(&self, i: usize, bond: usize) -> [f64; 2] {
+        if self.is_intact(i, bond - self.offsets[i]) {
+            return [1.0; 2];
         }
+        let softened = self.softened.as_ref();
+        let found = softened.and_then(|softened| softened.find(i, bond as u64));
+        found.map_or([0.0; 2], SoftenedBonds::left)
     }
 
     /// Returns true if a bond of a point has not broken.
     pub(super) fn stands(&self, i: usize, bond: usize) -> bool {
-        self.is_intact(i, bond - self.offsets[i])
-            || (self.softened.as_ref()).is_some_and(|softened| softened.has(i, bond as u64))
+        self.left_of(i, bond) != [0.0; 2]
     }
 }

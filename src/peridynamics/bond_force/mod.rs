@@ -93,6 +93,7 @@ pub use stencil::BlockSetup;
 
 pub(crate) use carried_deformation::{conjugate, felt};
 pub(crate) use list::{extension, ratio, stretched};
+pub(crate) use softened_bonds::{SoftenedBond, SoftenedBonds};
 
 use crate::dimension;
 use crate::peridynamics::CauchyStress;
@@ -164,8 +165,13 @@ pub trait BondPass<const D: usize>: Send + Sync {
         lost.value()
     }
 
-    /// Returns true if a bond of the reference families joins points `i` and `j`, both with a family, and is intact; contact leaves such pairs to their bond.
-    fn bonded(&self, i: usize, j: usize) -> bool;
+    /// Parts of its stiffness that the bond of point `i`, which has a family, to point `j` has: of its pair force, and of the extension that enters the dilatation; zero where none of the reference families joins them, or where it has broken.
+    fn left(&self, i: usize, j: usize) -> [f64; 2];
+
+    /// Returns true if a bond of the reference families joins the points and has not broken; contact leaves such pairs to their bond.
+    fn bonded(&self, i: usize, j: usize) -> bool {
+        self.left(i, j) != [0.0; 2]
+    }
 
     /// The bits that say which bonds stand.
     fn damage_state(&self) -> Vec<u64>;

@@ -30,17 +30,14 @@ impl BondSoftening {
     }
 
     /// The stretch beyond which a pass hands a bond over.
-    pub(super) fn limit(&self, brittle: f64) -> f64 {
+    pub(crate) fn limit(&self, brittle: f64) -> f64 {
         self.onset(brittle) * (1.0 + self.slack())
     }
 
-    /// The stretches `s_e` and `s_c` of a bond that is handed over beyond `limit`; both `s_0` of one that breaks at once.
-    pub(super) fn ends_of(&self, limit: f64, breaks_at_once: bool) -> [f64; 2] {
+    /// The stretches `s_e` and `s_c` of a bond that is handed over beyond `limit`.
+    pub(crate) fn ends_of(&self, limit: f64) -> [f64; 2] {
         let onset = limit / (1.0 + self.slack());
-        match breaks_at_once {
-            true => [onset * self.ratio.sqrt(); 2],
-            false => [onset, onset * self.ratio],
-        }
+        [onset, onset * self.ratio]
     }
 
     /// Growth of the largest stretch that is let pass, over `s_e`.
@@ -51,7 +48,7 @@ impl BondSoftening {
 
 /// A directed bond past the onset.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct SoftenedBond {
+pub(crate) struct SoftenedBond {
     /// Point whose force it is part of.
     pub near: u32,
     /// Its other end.
@@ -60,7 +57,7 @@ pub(super) struct SoftenedBond {
     pub slot: u64,
     /// s_e.
     pub onset: f64,
-    /// s_c; s_e of a bond that breaks at once.
+    /// s_c.
     end: f64,
     /// κ.
     largest: f64,
@@ -89,7 +86,7 @@ impl SoftenedBond {
 
 /// Loss of a bond in the last pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Loss {
+pub(crate) struct Loss {
     /// The bond, as it was.
     pub bond: SoftenedBond,
     /// Part of its stiffness that it lost.
@@ -100,7 +97,7 @@ pub(super) struct Loss {
 
 /// All bonds of a pass past the onset, ascending by point and number.
 #[derive(Clone, Debug)]
-pub(super) struct SoftenedBonds {
+pub(crate) struct SoftenedBonds {
     law: BondSoftening,
     bonds: Vec<SoftenedBond>,
     /// Those that the last pass took stiffness from, in the same order.
@@ -134,10 +131,11 @@ impl SoftenedBonds {
         &all[..all.partition_point(|b| b.near as usize == point)]
     }
 
-    /// Returns true if a bond is among them.
-    pub fn has(&self, near: usize, slot: u64) -> bool {
+    /// A bond, if it is among them.
+    pub fn find(&self, near: usize, slot: u64) -> Option<&SoftenedBond> {
         let key = (near as u32, slot);
-        self.bonds.binary_search_by_key(&key, |b| b.key()).is_ok()
+        let found = self.bonds.binary_search_by_key(&key, |b| b.key());
+        found.ok().map(|k| &self.bonds[k])
     }
 
     fn envelope(bond: &SoftenedBond) -> Envelope {

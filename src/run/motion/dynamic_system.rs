@@ -279,10 +279,7 @@ fn tell_bonds<const D: usize>(
     if model.body().is_some() {
         let at_seam = match (coupling.interface().faces, motion.has_seam_bonds()) {
             _ if is_linear => "",
-            (true, true) if motion.softens() => {
-                "; bonds that end on faces of elements break at once, with the same energy"
-            }
-            (true, true) => ", as do bonds that end on faces of elements",
+            (true, true) => "; bonds that end on faces of elements do the same",
             (true, false) => "; within two horizons of the seam they are linear and do not break",
             _ => "",
         };

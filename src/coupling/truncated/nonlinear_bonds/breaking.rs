@@ -12,7 +12,7 @@ use crate::{
     tensor::Vector,
 };
 
-use super::super::bond_kinematics::Part;
+use super::super::bond_kinematics::{Part, Strained};
 
 /// Bonds per task.
 const CHUNK: usize = 1024;
@@ -25,7 +25,7 @@ pub(super) type Carrier = Vec<(u32, f64)>;
 
 /// When bonds break.
 pub(super) struct Breaking<const D: usize> {
-    /// The value of t at the critical stretch of each bond.
+    /// The value of t at which each bond breaks, or begins to soften.
     limit: Vec<f64>,
     never: Vec<bool>,
     /// Part of each bond that counts for its stretch.
@@ -75,16 +75,31 @@ impl<const D: usize> Breaking<D> {
         u: &[f64],
     ) -> Vec<usize> {
         let is_over = |bond: usize| {
-            let difference = self.difference.displacement(bond, u);
-            let strained = match kinematics {
-                BondKinematics::Exact => self.part[bond].strained::<true>(&difference),
-                BondKinematics::Linear => self.part[bond].strained::<false>(&difference),
-            };
+            let strained = self.strained(kinematics, bond, u);
             strained.excess > self.limit[bond] * strained.square
         };
         parallel::filter_map(self.part.len(), CHUNK, |bond| {
             (stands(bond) && !self.never[bond] && is_over(bond)).then_some(bond)
         })
+    }
+
+    fn strained(&self, kinematics: BondKinematics, bond: usize, u: &[f64]) -> Strained<D> {
+        let difference = self.difference.displacement(bond, u);
+        match kinematics {
+            BondKinematics::Exact => self.part[bond].strained::<true>(&difference),
+            BondKinematics::Linear => self.part[bond].strained::<false>(&difference),
+        }
+    }
+
+    /// Stretch of a bond \[1\].
+    pub fn stretch(&self, kinematics: BondKinematics, bond: usize, u: &[f64]) -> f64 {
+        let strained = self.strained(kinematics, bond, u);
+        strained.elongation / (self.part[bond].length * strained.square)
+    }
+
+    /// The value of t at which a bond breaks, or begins to soften.
+    pub fn limit(&self, bond: usize) -> f64 {
+        self.limit[bond]
     }
 
     /// Returns the sites that move the ends of a bond, with their weights in the difference of displacement.

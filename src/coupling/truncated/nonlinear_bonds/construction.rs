@@ -74,6 +74,7 @@ impl<const D: usize> NonlinearSeam<D> {
             intact: Vec::new(),
             last: Vec::new(),
             breaks: None,
+            softening: None,
             kinematics: BondKinematics::Linear,
             sites: Vec::new(),
             offsets: vec![0],

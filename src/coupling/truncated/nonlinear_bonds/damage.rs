@@ -1,21 +1,19 @@
 //! Energy and damage of the bonds that a seam cuts.
 
 use super::breaking::Breaking;
+use super::softening::SeamSoftening;
 use super::{CHUNK, NonlinearSeam};
 use crate::{
     coupling::truncated::{bond_kinematics::Part, dilatation_state::States},
     parallel,
-    peridynamics::bond_force::{BondKinematics, BondPass, pack, unpack},
+    peridynamics::bond_force::{BondKinematics, BondPass},
     tensor::Vector,
 };
 
 impl<const D: usize> NonlinearSeam<D> {
-    /// The elongation of a part, zero if its bond is not `intact`.
-    pub(super) fn elongation_if_intact(&self, p: usize, u: &[f64], intact: &[u8]) -> f64 {
+    /// The elongation of a part.
+    pub(super) fn elongation(&self, p: usize, u: &[f64]) -> f64 {
         let part = &self.parts[p];
-        if intact[part.bond as usize / 8] >> (part.bond % 8) & 1 == 0 {
-            return 0.0;
-        }
         let d: Vector<D> = self.difference.displacement(p, u);
         match self.kinematics {
             BondKinematics::Exact => part.strained::<true>(&d).elongation,
@@ -25,16 +23,18 @@ impl<const D: usize> NonlinearSeam<D> {
 
     /// Energy of the parts that stand, and of the dilatations of the seam \[J\].
     pub(in crate::coupling) fn energy(&self, u: &[f64]) -> f64 {
-        let elongation: Vec<f64> = parallel::map(self.parts.len(), CHUNK, |p| {
-            self.elongation_if_intact(p, u, &self.intact)
-        });
+        let elongation: Vec<f64> =
+            parallel::map(self.parts.len(), CHUNK, |p| self.elongation(p, u));
         let parts = self.parts.iter().zip(&elongation);
-        let parts: f64 = parts.map(|(part, q)| 0.5 * part.stiffness * q * q).sum();
+        let parts: f64 = parts
+            .map(|(part, q)| 0.5 * self.left(part.bond)[0] * part.stiffness * q * q)
+            .sum();
         let Some(states) = &self.states else {
             return parts;
         };
         let own = states.own_parts(u, self.kinematics, |_| true);
-        let pressures = states.pressures(&own, &elongation, |_| true);
+        let handed = |p: usize| self.left(self.parts[p].bond)[1] * elongation[p];
+        let pressures = states.pressures(&own, handed, |_| true);
         parts + states.energy(&own, &pressures, u)
     }
 
@@ -43,8 +43,8 @@ impl<const D: usize> NonlinearSeam<D> {
         self.last.clear();
     }
 
-    /// Returns true if a bond of the seam broke in the last pass.
-    pub(in crate::coupling) fn has_broken(&self) -> bool {
+    /// Returns true if a bond of the seam broke or softened in the last pass.
+    pub(in crate::coupling) fn has_changed(&self) -> bool {
         !self.last.is_empty()
     }
 
@@ -57,8 +57,8 @@ impl<const D: usize> NonlinearSeam<D> {
         for of in self.lost.chunk_by(|a, b| a.0 == b.0) {
             let point = of[0].0;
             let sum = |all: bool| -> f64 {
-                let counted = of.iter().filter(|l| all || !self.stands(l.1));
-                counted.map(|l| l.2).sum()
+                let part = |bond| if all { 1.0 } else { 1.0 - self.left(bond)[1] };
+                of.iter().map(|l| part(l.1) * l.2).sum()
             };
             let (whole, lost) = (of_bonds(point), sum(false));
             let damage = &mut damage[point as usize];
@@ -81,21 +81,12 @@ impl<const D: usize> NonlinearSeam<D> {
             .map(|[i, _]| *i)
     }
 
-    /// Bits of the bonds that stand.
-    pub(in crate::coupling) fn damage_state(&self) -> Vec<u64> {
-        pack(&self.intact, self.bonds.len() as u64)
-    }
-
-    /// Puts back what [`NonlinearSeam::damage_state`] gave; false if it belongs to another seam.
-    pub(in crate::coupling) fn restore_damage(&mut self, state: &[u64]) -> bool {
-        unpack(state, self.bonds.len() as u64, &mut self.intact)
-    }
-
     /// Bytes held.
     pub(in crate::coupling) fn memory_bytes(&self) -> usize {
         self.parts.len() * (size_of::<Part<D>>() + D * 8 + 8)
             + self.breaks.as_ref().map_or(0, Breaking::memory_bytes)
             + self.states.as_ref().map_or(0, States::memory_bytes)
+            + (self.softening.as_ref()).map_or(0, SeamSoftening::memory_bytes)
             + self.difference.weight_count() * 28
             + self.families.neighbours.len() * 4
     }

@@ -3,6 +3,8 @@
 //! The force on a site takes the parts that end there and the dilatations to which these hand their elongation, hence all parts of such a dilatation. A bond of which a part is known breaks wherever it is, by the same
 //! numbers; its cost is counted by the process of its first end that is a site, that of a dilatation by the process of its point, or of the first node of its element.
 
+use rustc_hash::FxHashMap;
+
 use super::{NonlinearSeam, counted_bonds::OwnBonds};
 use crate::system::ExactSum;
 
@@ -102,16 +104,12 @@ impl<const D: usize> NonlinearSeam<D> {
 
     /// Adds what the seam would store less at a displacement for the bonds that the last pass broke \[J\], of bonds and dilatations that are counted here.
     pub(in crate::coupling) fn add_lost_energy(&self, u: &[f64], lost: &mut ExactSum) {
-        let mut before = self.intact.clone();
-        for &bond in &self.last {
-            before[bond as usize / 8] |= 1 << (bond % 8);
-        }
         let mut of = Vec::new();
-        for &bond in &self.last {
+        for &(bond, part) in &self.last {
             for p in self.parts_of(bond as usize) {
                 if self.computed.counts_bond(bond as usize) {
-                    let q = self.elongation_if_intact(p, u, &before);
-                    lost.add(0.5 * self.parts[p].stiffness * q * q);
+                    let q = self.elongation(p, u);
+                    lost.add(0.5 * part * self.parts[p].stiffness * q * q);
                 }
                 let states = self.states.iter();
                 of.extend(states.flat_map(|s| s.of_part(p).iter().map(|e| e.0)));
@@ -124,20 +122,24 @@ impl<const D: usize> NonlinearSeam<D> {
         let own = states.own_parts(u, self.kinematics, |f| {
             of.binary_search(&(f as u32)).is_ok()
         });
+        let parts: FxHashMap<u32, f64> = self.last.iter().copied().collect();
         for &f in &of {
-            let with = |intact: &[u8]| {
-                let q = |p: usize| self.elongation_if_intact(p, u, intact);
-                states.energy_of(f as usize, &own, q)
+            let with = |more: &dyn Fn(u32) -> f64| {
+                let left = |bond: u32| self.left(bond)[1] + more(bond);
+                let handed = |p: usize| left(self.parts[p].bond) * self.elongation(p, u);
+                states.energy_of(f as usize, &own, handed)
             };
-            lost.add(with(&before) - with(&self.intact));
+            let before = with(&|bond| parts.get(&bond).copied().unwrap_or(0.0));
+            lost.add(before - with(&|_| 0.0));
         }
     }
 
     /// Bonds that the last pass broke here and not in that of the body, of those that are counted here.
     pub(in crate::coupling) fn broken_here(&self) -> Vec<u64> {
-        let own = self.last.iter().filter(|bond| (**bond as usize) < self.own);
-        let counted = own.filter(|bond| self.computed.counts_bond(**bond as usize));
-        counted.map(|&bond| u64::from(bond)).collect()
+        let last = self.last.iter().map(|&(bond, _)| bond);
+        let own = last.filter(|&bond| (bond as usize) < self.own && !self.stands(bond));
+        let counted = own.filter(|&bond| self.computed.counts_bond(bond as usize));
+        counted.map(u64::from).collect()
     }
 
     /// Breaks bonds that others broke.
