@@ -14,7 +14,7 @@ use super::validated::Scene;
 use super::zones::Placed;
 use crate::fem::Locator;
 use crate::mesh::facet_corners;
-use crate::model::patch::{self, Linear, PatchError, PatchLattice, Patched};
+use crate::model::patch::{self, PatchError, PatchLattice, Patched, Replaced};
 use crate::model::{Reach, Zone};
 use crate::observe::report::number;
 use crate::observe::summary::Decision;
@@ -191,18 +191,27 @@ fn with_rim<const D: usize>(
 /// Says how large the rim is, and what of the mesh ends at it.
 fn told<const D: usize>(patched: &Patched<D>, edge: f64, why: &str) -> Decision {
     let embedded = &patched.mesh.embedded;
-    let Linear { cells, moved } = patched.linear;
-    let mut linear = match cells {
+    let Replaced {
+        linear,
+        moved,
+        halved,
+        ..
+    } = &patched.replaced;
+    let mut replaced = match linear {
         0 => String::new(),
         n => format!(", {n} of second order are linear there"),
     };
-    if moved > STRAIGHT * edge {
-        let moved = number(moved);
-        linear += &format!(", with straight sides, which move their surfaces by up to {moved}");
+    if *moved > STRAIGHT * edge {
+        let moved = number(*moved);
+        replaced += &format!(", with straight sides, which move their surfaces by up to {moved}");
     }
+    replaced += &match halved.len() {
+        0 => String::new(),
+        n => format!(", {n} quadrilaterals are two triangles each there"),
+    };
     Decision {
         choice: format!(
-            "a rim of {} elements of edge {} around the zone; {} elements of the mesh end at it{linear}",
+            "a rim of {} elements of edge {} around the zone; {} elements of the mesh end at it{replaced}",
             patched.rim,
             number(edge),
             embedded.cut.len() - embedded.pieces.len(),

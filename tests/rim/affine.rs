@@ -6,7 +6,7 @@ use super::meshes::{Body, Random, SURFACE};
 use super::{Drawn, scene, zone};
 
 /// Largest distance of a displacement from the affine field, over the largest displacement.
-const LIMIT: f64 = 1e-11;
+pub const LIMIT: f64 = 1e-11;
 
 /// The gradient G of the field u = G x.
 const GRADIENT: [[f64; 3]; 3] = [
@@ -53,7 +53,7 @@ pub fn error(solution: &Solution, field: impl Fn(&[f64; 3]) -> [f64; 3]) -> f64 
 }
 
 /// Energy of the affine field in a body of unit modulus: ½ ε:C:ε over its volume.
-fn energy<const D: usize>(nu: f64, volume: f64) -> f64 {
+pub fn energy<const D: usize>(nu: f64, volume: f64) -> f64 {
     let mu = 0.5 / (1.0 + nu);
     let lambda = match D {
         2 => nu / (1.0 - nu * nu),

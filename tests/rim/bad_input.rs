@@ -1,6 +1,5 @@
 //! Refusals by name of what a zone with a rim of its own does not have.
 
-use bondline::mesh::MeshParts;
 use bondline::{Condition, Material, Region, SceneBuilder, Silent};
 
 use super::meshes::{Body, Random};
@@ -93,21 +92,21 @@ fn two_materials_in_the_patch() {
 
 #[test]
 fn cells_that_may_not_be_cut() {
-    let body = Body::<2> { edge: 5.0, ..BODY };
-    // quadrilaterals of the jittered nodes have no constant Jacobian
-    let triangles = body.mesh();
-    let (n, at) = (4, |i: usize, j: usize| (j * 5 + i) as u64);
-    let boxes = (0..n * n).map(|k| (k % n, k / n));
-    let cells = boxes.flat_map(|(i, j)| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
-    let mesh = MeshParts {
-        blocks: vec![
-            triangles.blocks[0].clone(),
-            (bondline::CellShape::Quad4, cells.collect()),
-        ],
-        ..triangles
+    // the faces of hexahedra of jittered nodes are bent
+    let body = Body::<3> {
+        size: [8.0; 3],
+        edge: 2.7,
+        seed: 901,
     };
+    let solid = scene(&body, &mut Random::new(body.seed))
+        .mesh(body.boxes(0.1, 0.0))
+        .nonlocal(Region::ball([4.0; 3], 1.8))
+        .material("body", Material::bond_based(1.0))
+        .horizon(2.0)
+        .coupling("truncated")
+        .condition("left", Condition::displacement("left").x(0.0).y(0.0).z(0.0));
     refused(
-        &plate().mesh(mesh),
-        &["zones.rim", "is cut by the rim of the zone", "Quad4"],
+        &solid,
+        &["zones.rim", "is cut by the rim of the zone", "Hex8"],
     );
 }

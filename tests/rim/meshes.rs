@@ -1,4 +1,6 @@
-//! Meshes of simplices whose inner nodes lie anywhere: a grid of boxes, its inner nodes moved at random, each box cut into simplices.
+//! Meshes whose inner nodes lie anywhere: a grid of boxes, its inner nodes moved at random, each box cut into simplices or left as it is.
+
+use std::collections::BTreeMap;
 
 use bondline::CellShape;
 use bondline::mesh::MeshParts;
@@ -55,10 +57,9 @@ impl<const D: usize> Body<D> {
         self.size.map(|s| (s / self.edge).round().max(1.0) as usize)
     }
 
-    /// Nodes of the grid; inner ones are moved by up to a quarter of an edge along each axis, a seventh in solids.
-    fn nodes(&self, random: &mut Random) -> Vec<[f64; 3]> {
+    /// Nodes of the grid; inner ones are moved by up to a part of an edge along each axis.
+    fn nodes(&self, reach: f64, random: &mut Random) -> Vec<[f64; 3]> {
         let counts = self.counts();
-        let reach = [0.25, 0.25, 0.14][D - 1];
         let total = counts.iter().map(|n| n + 1).product();
         let node = |number: usize| {
             let mut rest = number;
@@ -79,17 +80,17 @@ impl<const D: usize> Body<D> {
         (0..total).map(node).collect()
     }
 
-    /// The mesh in simplices, with its sides and its surface as sets of facets.
+    /// The mesh in simplices, with its sides and its surface as sets of facets; inner nodes are moved by up to a quarter of an edge, a seventh in solids.
     pub fn mesh(&self) -> MeshParts {
         let mut random = Random::new(self.seed);
-        let points = self.nodes(&mut random);
+        let points = self.nodes([0.25, 0.25, 0.14][D - 1], &mut random);
         let mut cells = Vec::new();
         for number in 0..self.counts().iter().product() {
             // in a plane each box has a diagonal of its own; tetrahedra have to meet
             let is_mirrored = D == 2 && random.unit() < 0.5;
             self.cut_box(number, is_mirrored, &mut cells);
         }
-        let (facets, element_sets) = self.sides(&points, &cells);
+        let (facets, element_sets) = self.sides(&points, &facets_of(&cells, &left_out::<D>()));
         let shapes = [CellShape::Line2, CellShape::Tri3, CellShape::Tet4];
         let mut blocks = vec![(shapes[D - 1], cells)];
         if D > 1 {
@@ -109,26 +110,66 @@ impl<const D: usize> Body<D> {
         }
     }
 
+    /// The mesh in quadrilaterals or hexahedra, of which a part is cut into triangles, with its sides and its surface as sets of facets, inner nodes moved by up to `reach` of an edge.
+    pub fn boxes(&self, reach: f64, triangles: f64) -> MeshParts {
+        let mut random = Random::new(self.seed);
+        let points = self.nodes(reach, &mut random);
+        let (mut whole, mut cut) = (Vec::new(), Vec::new());
+        for number in 0..self.counts().iter().product() {
+            match random.unit() < triangles {
+                true => self.cut_box(number, false, &mut cut),
+                false => {
+                    let corners = [0, 1, 3, 2, 4, 5, 7, 6].into_iter().take(1 << D);
+                    whole.extend(corners.map(|bits| self.corner(number, bits)));
+                }
+            }
+        }
+        let around: &[&[usize]] = match D {
+            2 => &[&[0, 1], &[1, 2], &[2, 3], &[3, 0]],
+            _ => &[
+                &[0, 3, 2, 1],
+                &[4, 5, 6, 7],
+                &[0, 1, 5, 4],
+                &[1, 2, 6, 5],
+                &[2, 3, 7, 6],
+                &[3, 0, 4, 7],
+            ],
+        };
+        let around: Vec<Vec<usize>> = around.iter().map(|facet| facet.to_vec()).collect();
+        let mut all: Vec<Vec<u64>> = (whole.chunks_exact(1 << D))
+            .flat_map(|cell| facets_of(cell, &around))
+            .collect();
+        all.extend(facets_of(&cut, &left_out::<D>()));
+        let (facets, element_sets) = self.sides(&points, &all);
+        let shapes = match D {
+            2 => [CellShape::Line2, CellShape::Quad4, CellShape::Tri3],
+            _ => [CellShape::Quad4, CellShape::Hex8, CellShape::Tet4],
+        };
+        let blocks = shapes.into_iter().zip([facets, whole, cut]);
+        MeshParts {
+            name: "body".into(),
+            points,
+            blocks: blocks.filter(|block| !block.1.is_empty()).collect(),
+            element_sets,
+            point_sets: Vec::new(),
+        }
+    }
+
+    /// The node at a corner of a box, whose bits say on which side of the box it lies along each axis.
+    fn corner(&self, number: usize, bits: usize) -> u64 {
+        let counts = self.counts();
+        let (mut rest, mut stride, mut node) = (number, 1, 0);
+        for (i, count) in counts.into_iter().enumerate() {
+            node += (rest % count + (bits >> i & 1)) * stride;
+            rest /= count;
+            stride *= count + 1;
+        }
+        node as u64
+    }
+
     /// Cuts a box into simplices from its lowest corner to its highest, one for each order of the axes.
     fn cut_box(&self, number: usize, is_mirrored: bool, cells: &mut Vec<u64>) {
-        let counts = self.counts();
-        let mut rest = number;
-        let mut corner = [0; D];
-        for i in 0..D {
-            corner[i] = rest % counts[i];
-            rest /= counts[i];
-        }
-        let node = |bits: usize| {
-            let mut stride = 1;
-            let mut sum = 0;
-            for i in 0..D {
-                let is_upper = bits >> i & 1 == 1;
-                let k = usize::from(is_upper != (is_mirrored && i == 0));
-                sum += (corner[i] + k) * stride;
-                stride *= counts[i] + 1;
-            }
-            sum as u64
-        };
+        let node = |bits: usize| self.corner(number, bits ^ usize::from(is_mirrored));
         let orders: &[(&[usize], bool)] = match D {
             1 => &[(&[0], true)],
             2 => &[(&[0, 1], true), (&[1, 0], false)],
@@ -156,26 +197,83 @@ impl<const D: usize> Body<D> {
     }
 
     /// Facets of the surface, and those of each side and of all by their numbers.
-    fn sides(&self, points: &[[f64; 3]], cells: &[u64]) -> (Vec<u64>, Vec<(String, Vec<u64>)>) {
-        let mut facets = Vec::new();
+    fn sides(&self, points: &[[f64; 3]], all: &[Vec<u64>]) -> (Vec<u64>, Vec<(String, Vec<u64>)>) {
+        let (mut facets, mut count) = (Vec::new(), 0);
         let mut of_side = vec![Vec::new(); 2 * D];
-        for simplex in cells.chunks_exact(D + 1) {
-            for left_out in 0..=D {
-                let facet = (0..=D).filter(|&k| k != left_out).map(|k| simplex[k]);
-                let facet: Vec<u64> = facet.collect();
-                for (side, own) in of_side.iter_mut().enumerate() {
-                    let plane = [0.0, self.size[side / 2]][side % 2];
-                    let is_on = |n: &u64| (points[*n as usize][side / 2] - plane).abs() < 1e-12;
-                    if D > 1 && facet.iter().all(is_on) {
-                        own.push((facets.len() / D) as u64);
-                        facets.extend(&facet);
-                    }
+        for facet in all {
+            for (side, own) in of_side.iter_mut().enumerate() {
+                let plane = [0.0, self.size[side / 2]][side % 2];
+                let is_on = |n: &u64| (points[*n as usize][side / 2] - plane).abs() < 1e-12;
+                if D > 1 && facet.iter().all(is_on) {
+                    own.push(count);
+                    facets.extend(facet);
+                    count += 1;
                 }
             }
         }
-        let all = (0..(facets.len() / D) as u64).collect();
         let sides = SIDES.iter().map(|s| (*s).to_owned()).zip(of_side);
-        let sets = sides.chain([(SURFACE.to_owned(), all)]);
+        let sets = sides.chain([(SURFACE.to_owned(), (0..count).collect())]);
         (facets, if D > 1 { sets.collect() } else { Vec::new() })
+    }
+}
+
+/// The places of all nodes of a simplex but one, for each.
+fn left_out<const D: usize>() -> Vec<Vec<usize>> {
+    (0..=D)
+        .map(|out| (0..=D).filter(|&k| k != out).collect())
+        .collect()
+}
+
+/// Facets of cells of one shape, by the places of their nodes.
+fn facets_of(cells: &[u64], places: &[Vec<usize>]) -> Vec<Vec<u64>> {
+    let nodes = 1 + places.iter().flatten().max().copied().unwrap_or(0);
+    (cells.chunks_exact(nodes))
+        .flat_map(|cell| {
+            let facet = |places: &Vec<usize>| places.iter().map(|&k| cell[k]).collect();
+            places.iter().map(facet).collect::<Vec<Vec<u64>>>()
+        })
+        .collect()
+}
+
+/// The mesh with a node in the middle of each side of its quadrilaterals and their facets; inner ones lie beside the middle by up to `reach` of the side.
+pub fn raised(mesh: MeshParts, reach: f64, random: &mut Random) -> MeshParts {
+    let outer: Vec<[u64; 2]> = (mesh.blocks[0].1.chunks_exact(2))
+        .map(|side| [side[0].min(side[1]), side[0].max(side[1])])
+        .collect();
+    let mut points = mesh.points;
+    let mut middle: BTreeMap<[u64; 2], u64> = BTreeMap::new();
+    let mut blocks = Vec::new();
+    for (shape, nodes) in &mesh.blocks {
+        let (count, raised) = match shape {
+            CellShape::Line2 => (2, CellShape::Line3),
+            CellShape::Quad4 => (4, CellShape::Quad8),
+            other => panic!("a mesh of {other:?}"),
+        };
+        let mut all = Vec::new();
+        for cell in nodes.chunks_exact(count) {
+            all.extend(cell);
+            for k in 0..if count == 2 { 1 } else { count } {
+                let (p, q) = (cell[k], cell[(k + 1) % count]);
+                let ends = [p.min(q), p.max(q)];
+                all.push(*middle.entry(ends).or_insert_with(|| {
+                    let [a, b] = ends.map(|n| points[n as usize]);
+                    let off = if outer.contains(&ends) { 0.0 } else { reach };
+                    let [dx, dy] = [b[0] - a[0], b[1] - a[1]];
+                    let [s, t] = [(); 2].map(|()| off * random.within(-1.0, 1.0));
+                    points.push([
+                        0.5 * (a[0] + b[0]) + s * dx - t * dy,
+                        0.5 * (a[1] + b[1]) + s * dy + t * dx,
+                        0.0,
+                    ]);
+                    points.len() as u64 - 1
+                }));
+            }
+        }
+        blocks.push((raised, all));
+    }
+    MeshParts {
+        points,
+        blocks,
+        ..mesh
     }
 }

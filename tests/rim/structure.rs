@@ -14,7 +14,7 @@ const DURATION: f64 = 30000.0;
 /// Part of the largest diagonal entry above which all eigenvalues but those of rigid motions lie.
 const STIFF: f64 = 1e-4;
 
-fn truncated<const D: usize>(body: &Body<D>, material: Material, shape: Drawn) -> SceneBuilder {
+pub fn truncated<const D: usize>(body: &Body<D>, material: Material, shape: Drawn) -> SceneBuilder {
     let mut random = Random::new(body.seed);
     let radius = if D == 2 { 2.4 } else { 1.8 };
     scene(body, &mut random)
@@ -98,7 +98,7 @@ fn is_definite(mut a: Vec<Vec<f64>>) -> bool {
 /// A symmetric stiffness whose kernel is that of rigid motions.
 ///
 /// With K R = 0 for orthonormal rigid motions R, `K + c R Rᵀ − STIFF c I` is definite only if every other eigenvalue is above `STIFF c`.
-fn assert_symmetric_and_stiff<const D: usize>(scene: &SceneBuilder, case: &str) {
+pub fn assert_symmetric_and_stiff<const D: usize>(scene: &SceneBuilder, case: &str) {
     let model = model(scene);
     let mut k = dense(&model);
     let n = k.len();
@@ -177,19 +177,26 @@ fn solids_whose_surface_cuts_the_zone_off_the_lattice_turn_without_force() {
     }
 }
 
-/// Mass and its first moment are those of the body.
-fn assert_masses<const D: usize>(scene: &SceneBuilder, body: &Body<D>) {
+/// Mass is that of the body, and positive.
+pub fn assert_mass<const D: usize>(scene: &SceneBuilder, body: &Body<D>) -> LinearModel {
     let model = model(scene);
     let wanted = DENSITY * body.volume();
     let total: f64 = model.motion.mass.iter().sum();
     println!("{D}D mass {:e}", total / wanted - 1.0);
     assert!((total / wanted - 1.0).abs() < 1e-13, "{total} {wanted}");
+    assert!(model.motion.mass.iter().all(|m| *m > 0.0));
+    model
+}
+
+/// So is its first moment.
+pub fn assert_masses<const D: usize>(scene: &SceneBuilder, body: &Body<D>) {
+    let model = assert_mass(scene, body);
+    let wanted = DENSITY * body.volume();
     for (i, middle) in body.middle().into_iter().enumerate() {
         let sites = model.motion.mass.iter().zip(&model.position);
         let moment: f64 = sites.map(|(m, x)| m * x[i]).sum();
         assert!((moment / (wanted * middle) - 1.0).abs() < 1e-13, "{moment}");
     }
-    assert!(model.motion.mass.iter().all(|m| *m > 0.0));
 }
 
 #[test]

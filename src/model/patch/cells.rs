@@ -26,6 +26,7 @@ const MOST: f64 = 2e8;
 pub(super) type Index<const D: usize> = [i32; D];
 
 /// Cells of a patch.
+#[derive(Clone)]
 pub(super) struct PatchCells<const D: usize> {
     pub cells: Cells<D>,
     /// Cells that hold points.
@@ -115,7 +116,7 @@ impl<const D: usize> PatchCells<D> {
             from.map(|i| i - width - MARGIN),
             to.map(|i| i + width + MARGIN),
         );
-        let held = held(mesh, &cells, limits.0, limits.1);
+        let held = held(mesh, &cells, limits);
         let mut patch = Self {
             cells,
             zone: BTreeSet::new(),
@@ -352,6 +353,22 @@ impl<const D: usize> PatchCells<D> {
         pieces
     }
 
+    /// The patch in a mesh of which some cells are halves: of each the first has its number, the second ones are the last cells.
+    pub fn in_halves(&self, mesh: &Mesh<D>, halved: &[u32]) -> Self {
+        let mut patch = self.clone();
+        for own in patch.held.values_mut() {
+            own.retain(|part| halved.binary_search(&part.0).is_err());
+        }
+        let second = mesh.cell_count() - halved.len()..mesh.cell_count();
+        for c in halved.iter().map(|&c| c as usize).chain(second) {
+            for (index, volume) in parts(mesh, &patch.cells, patch.limits, c) {
+                let own = patch.held.entry(index).or_default();
+                own.push((c as u32, volume));
+            }
+        }
+        patch
+    }
+
     /// Position of a node of the lattice's cells.
     pub fn node(&self, index: &Index<D>) -> Vector<D> {
         self.cells.centre(index) - Vector::repeat(0.5 * self.cells.spacing)
@@ -424,30 +441,36 @@ fn extent<const D: usize>(cells: &BTreeSet<Index<D>>) -> Option<(Index<D>, Index
 fn held<const D: usize>(
     mesh: &Mesh<D>,
     cells: &Cells<D>,
-    from: Index<D>,
-    to: Index<D>,
+    limits: (Index<D>, Index<D>),
 ) -> BTreeMap<Index<D>, Vec<(u32, f64)>> {
-    let meets =
-        |low: &Index<D>, high: &Index<D>| (0..D).all(|i| low[i] <= to[i] && high[i] >= from[i]);
-    let of_cell = |c: usize| {
-        let mut parts: BTreeMap<Index<D>, f64> = BTreeMap::new();
-        let (low, high) = mesh.bounds_of(mesh.corners(c));
-        let (low, high) = cells.range(&low, &high);
-        if meets(&low, &high) {
-            for simplex in simplices_of(mesh, c) {
-                cells.dice(&simplex, &meets, &mut |index, part| {
-                    *parts.entry(index).or_insert(0.0) += part.size();
-                });
-            }
-        }
-        parts
-    };
     let mut held: BTreeMap<Index<D>, Vec<(u32, f64)>> = BTreeMap::new();
-    let each = parallel::map(mesh.cell_count(), 64, of_cell);
+    let each = parallel::map(mesh.cell_count(), 64, |c| parts(mesh, cells, limits, c));
     for (c, parts) in each.into_iter().enumerate() {
         for (index, volume) in parts {
             held.entry(index).or_default().push((c as u32, volume));
         }
     }
     held
+}
+
+/// Volumes of the parts of a cell of the mesh in cells of the lattice between two corners.
+fn parts<const D: usize>(
+    mesh: &Mesh<D>,
+    cells: &Cells<D>,
+    (from, to): (Index<D>, Index<D>),
+    c: usize,
+) -> BTreeMap<Index<D>, f64> {
+    let meets =
+        |low: &Index<D>, high: &Index<D>| (0..D).all(|i| low[i] <= to[i] && high[i] >= from[i]);
+    let mut parts: BTreeMap<Index<D>, f64> = BTreeMap::new();
+    let (low, high) = mesh.bounds_of(mesh.corners(c));
+    let (low, high) = cells.range(&low, &high);
+    if meets(&low, &high) {
+        for simplex in simplices_of(mesh, c) {
+            cells.dice(&simplex, &meets, &mut |index, part| {
+                *parts.entry(index).or_insert(0.0) += part.size();
+            });
+        }
+    }
+    parts
 }

@@ -7,8 +7,8 @@ use rustc_hash::FxHashSet;
 use super::{
     cells::{Face, Index, PatchCells, block},
     cuts::Cuts,
-    linear::Linear,
     moments::PartMoments,
+    replaced::Replaced,
     rows::{Place, Rows},
     sides::Sides,
     surface::PatchSurface,
@@ -42,8 +42,8 @@ pub struct Patched<const D: usize> {
     pub torn: FxHashSet<String>,
     /// Cells of the rim.
     pub rim: usize,
-    /// Cells of second order that became linear.
-    pub linear: Linear,
+    /// Cells that were replaced before the patch cut them.
+    pub replaced: Replaced,
 }
 
 /// A mesh with its patch, but for the nodes that follow others.
@@ -119,7 +119,7 @@ impl<'s, const D: usize> Composite<'s, D> {
         let mut composite = Self {
             patched: Patched {
                 rim: patch.all.len() - patch.zone.len(),
-                linear: Linear::default(),
+                replaced: Replaced::default(),
                 mesh,
                 nonlocal,
                 origin,

@@ -10,12 +10,15 @@ use super::{
 use crate::{
     fem,
     mesh::{CellShape, CutCell, Mesh},
-    model::simplex::{as_box, simplices_of},
+    model::simplex::simplices_of,
     parallel,
 };
 
 /// Part of a cell's volume below which nothing is left of it.
-const NOTHING: f64 = 1e-10;
+pub(super) const NOTHING: f64 = 1e-10;
+
+/// Distance of a corner of a parallelogram from where the others want it, over its shortest side, that rounding leaves.
+const ROUNDING: f64 = 1e-10;
 
 /// The elements that a patch cuts.
 pub(super) struct Cuts {
@@ -104,10 +107,20 @@ fn parts<const D: usize>(mesh: &Mesh<D>, patch: &PatchCells<D>, c: usize) -> (Pa
 }
 
 /// Returns true if a cell may be cut: its shape functions are polynomials in space.
-fn may_be_cut<const D: usize>(mesh: &Mesh<D>, c: usize) -> bool {
-    match mesh.shapes[c] {
+pub(super) fn may_be_cut<const D: usize>(mesh: &Mesh<D>, c: usize) -> bool {
+    let shape = mesh.shapes[c];
+    match shape {
         CellShape::Line2 | CellShape::Tri3 | CellShape::Tet4 => true,
-        CellShape::Quad4 | CellShape::Hex8 => as_box(mesh, c).is_some(),
+        CellShape::Quad4 => is_parallelogram(mesh, mesh.cell(c)),
+        CellShape::Hex8 => (0..shape.facets().len() as u8)
+            .all(|local| is_parallelogram(mesh, &mesh.facet((c as u32, local)).nodes)),
         _ => false,
     }
+}
+
+/// Returns true if four corners, one after another, are those of a parallelogram.
+fn is_parallelogram<const D: usize>(mesh: &Mesh<D>, corners: &[u32]) -> bool {
+    let x = |i: usize| mesh.nodes[corners[i] as usize];
+    let shortest = (x(1) - x(0)).norm().min((x(3) - x(0)).norm());
+    (x(0) - x(1) + x(2) - x(3)).norm() <= ROUNDING * shortest
 }

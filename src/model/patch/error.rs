@@ -54,7 +54,7 @@ pub enum PatchError {
     },
     /// The outer face of the rim cuts a cell of a kind that it may not.
     #[error(
-        "cell {cell}, a {shape:?}, at {position:?}, is cut by the rim of the zone; only lines, triangles, tetrahedra, and rectangles and cuboids along the axes may be"
+        "cell {cell}, a {shape:?}, at {position:?}, is cut by the rim of the zone; only lines, triangles, quadrilaterals, tetrahedra and parallelepipeds may be"
     )]
     Kind {
         /// Number of the cell.

@@ -3,7 +3,7 @@
 //! | file | content |
 //! |---|---|
 //! | `cells.rs` | cells of the zone, the rim around them, and the faces Γ of the rim |
-//! | `linear.rs` | cells of second order that the patch meets, linear with straight sides |
+//! | `replaced.rs` | cells of second order that the patch meets, linear with straight sides; quadrilaterals that it cuts, two triangles |
 //! | `cuts.rs` | elements that Γ cuts: what is left of them |
 //! | `tie.rs` | the displacement of the nodes of Γ, by a dual mortar |
 //! | `followers.rs` | nodes that no good element holds |
@@ -30,14 +30,14 @@ mod cuts;
 mod error;
 mod followers;
 mod left;
-mod linear;
 mod moments;
+mod replaced;
 mod rows;
 mod sides;
 mod surface;
 mod tie;
 
-pub use self::{composite::Patched, error::PatchError, left::Left, linear::Linear};
+pub use self::{composite::Patched, error::PatchError, left::Left, replaced::Replaced};
 
 use std::collections::BTreeMap;
 
@@ -117,8 +117,8 @@ fn embedded<const D: usize>(
     is_held: &dyn Fn(u32) -> bool,
     lattice: PatchLattice<D>,
 ) -> Result<Patched<D>, PatchError> {
-    let (mesh, linear) = linear::linear_at(mesh, patch);
-    let mesh = mesh.as_ref();
+    let (mesh, patch, replaced) = replaced::replaced(mesh, patch);
+    let (mesh, patch) = (mesh.as_ref(), patch.as_ref());
     let cuts = Cuts::new(mesh, patch)?;
     if lattice.may_part {
         sides::check_elements(mesh, patch, &cuts)?;
@@ -147,7 +147,13 @@ fn embedded<const D: usize>(
             volume,
         });
     }
-    Ok(Patched { linear, ..patched })
+    for c in &mut patched.origin {
+        *c = replaced.origin(*c);
+    }
+    Ok(Patched {
+        replaced,
+        ..patched
+    })
 }
 
 /// A node of elements that follows none and has no positive volume, if there is one, where nodes that follow hand theirs on by these rows.
