@@ -5,6 +5,7 @@
 
 use crate::Effort;
 use crate::observed::run_scene;
+use crate::specimens;
 use bondline::{
     observe::report::{Columns, Table, TableRow},
     progress::Progress,
@@ -298,5 +299,5 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         Columns::Full,
     );
     table.rows.extend(rows.into_iter().flatten());
-    vec![table]
+    vec![table, specimens::table(effort, progress)]
 }

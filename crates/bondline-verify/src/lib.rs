@@ -7,7 +7,7 @@
 //! | `truncated` | truncated bonds: symmetry, definiteness, affine fields, equilibrium, order in δ, savings by symmetry |
 //! | `seams` | cracks and waves in the plane beside every method, conditions of seams that do not follow the lattice |
 //! | `skin` | bars with free sides, with a skin of elements and without |
-//! | `growth` | the load at which a long straight crack grows, under the K-field |
+//! | `growth` | the load at which a long straight crack grows, under the K-field; specimens beside fracture mechanics |
 //! | `softening` | softening bonds: a notched strip pulled to separation, a notched beam in three-point bending |
 //! | `damage` | continuum damage: stress of a bar, plate with a hole of [SAND2015-7998] section 6.2.5 |
 //! | `ductile` | the notched bar of [SAND2015-7998] section 6.3.1 beside CalculiX, until it tears |
@@ -65,6 +65,7 @@ pub mod reflection;
 pub mod report_page;
 pub mod scale;
 pub mod softening;
+mod specimens;
 pub mod spectrum;
 pub mod strip;
 pub mod surface_layer;
@@ -163,7 +164,7 @@ pub const SUITES: &[Suite] = &[
     },
     Suite {
         name: "growth",
-        about: "load at which a long straight crack grows, over sqrt(G0 E'), under the K-field: laws, ratios, directions, heights in the cell",
+        about: "load at which a long straight crack grows, over sqrt(G0 E'), under the K-field: laws, ratios, directions, heights in the cell; coupled specimens beside fracture mechanics",
         run: growth::run,
     },
     Suite {
