@@ -119,7 +119,6 @@ coupling = "truncated"
 materials.m.bond-based.youngs-modulus = 7e4
 peridynamics = { horizon = 3, points.lattice = { spacing = 1, origin = [0.5, 0.5] } }
 zones.nonlocal.ball = { center = [0, 0], radius = 13 }
-zones.rim = "mesh"
 conditions.held.displacement = { inside.ball = { center = [30, 0], radius = 0.1 }, x = 0, y = 0 }
 conditions.turned.displacement = { inside.ball = { center = [-30, 0], radius = 0.1 }, y = 0 }
 conditions.p.pressure = { on = "bore", value = 40 }
