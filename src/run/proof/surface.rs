@@ -19,6 +19,9 @@ pub(super) const PLANE: f64 = 0.99;
 /// The cosine above which a surface goes on from one facet to the other without an edge: a circle of six facets is still one.
 const SMOOTH: f64 = 0.49;
 
+/// Distance, in spacings, up to which a corner lies on a facet.
+const TOUCHING: f64 = 1e-6;
+
 /// Kind of a facet of the outer boundary, by the conditions of the scene on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) enum FacetKind {
@@ -163,28 +166,41 @@ impl<'a, const D: usize> Boundary<'a, D> {
 
     /// The facets in which a surface goes on from one of them without an edge, one entry per facet.
     pub fn smooth_surface(&self, main: usize) -> Vec<bool> {
-        let mut at_node: FxHashMap<u32, Vec<usize>> = FxHashMap::default();
-        for (f, facet) in self.facets.iter().enumerate() {
-            for &n in facet_corners::<D>(&facet.nodes) {
-                at_node.entry(n).or_default().push(f);
-            }
-        }
+        let beside = self.beside();
         let mut is_found = vec![false; self.facets.len()];
         is_found[main] = true;
         let mut last = vec![main];
         while let Some(f) = last.pop() {
-            let own = facet_corners::<D>(&self.facets[f].nodes);
-            for &other in own.iter().flat_map(|n| &at_node[n]) {
-                let corners = facet_corners::<D>(&self.facets[other].nodes);
-                let shared = corners.iter().filter(|n| own.contains(n)).count();
+            for &other in &beside[f] {
                 let goes_on = self.normals[f].dot(&self.normals[other]) > SMOOTH;
-                if !is_found[other] && shared + 1 >= D && goes_on {
+                if !is_found[other] && goes_on {
                     is_found[other] = true;
                     last.push(other);
                 }
             }
         }
         is_found
+    }
+
+    /// The facets that each one shares an edge with, or a part of one: those that a patch cuts, and their parts in it, have nodes of their own.
+    fn beside(&self) -> Vec<Vec<usize>> {
+        let mut beside = vec![Vec::new(); self.facets.len()];
+        let limit = TOUCHING * self.model.spacing().min(self.reach);
+        for (f, facet) in self.facets.iter().enumerate() {
+            let mut at_corners: Vec<usize> = Vec::new();
+            for &n in facet_corners::<D>(&facet.nodes) {
+                let x = &self.model.mesh.nodes[n as usize];
+                at_corners.extend(self.near_of(x, limit, |other| other != f).map(|(o, _)| o));
+            }
+            at_corners.sort_unstable();
+            for of in at_corners.chunk_by(|a, b| a == b) {
+                if of.len() + 1 >= D {
+                    beside[f].push(of[0]);
+                    beside[of[0]].push(f);
+                }
+            }
+        }
+        beside
     }
 
     /// The parts of a smooth surface that are the points', but for those in the plane of its facet `main`.
