@@ -91,6 +91,16 @@ impl<const D: usize> Tensor4<D> {
         })
     }
 
+    /// Returns the stress under a unit stretch along the first axis with free sides, of an isotropic C: Young's modulus, in plane strain over 1 − ν².
+    pub fn uniaxial_modulus(&self) -> f64 {
+        let (along, across) = (self.get(0, 0, 0, 0), self.get(0, 0, D - 1, D - 1));
+        match D {
+            1 => along,
+            2 => along - across * across / along,
+            _ => along - 2.0 * across * across / (along + across),
+        }
+    }
+
     /// The largest component by magnitude.
     pub fn amax(&self) -> f64 {
         self.0

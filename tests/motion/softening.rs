@@ -216,3 +216,42 @@ fn a_crack_at_a_seam_goes_on_from_its_checkpoint() {
     );
     crate::resumes_with_the_same_bytes(&format!("coupling = \"truncated\"\n{typed}"));
 }
+
+#[test]
+fn a_strip_without_a_crack_bears_what_the_run_says() {
+    let folder = tempfile::tempdir().unwrap();
+    for (law, limit) in [
+        ("bond-based]\nyoungs-modulus = 70e3", 0.02),
+        // dilatations share what bonds along the axis lose
+        ("lps]\nyoungs-modulus = 70e3\npoisson-ratio = 0.3", 0.06),
+    ] {
+        let typed = CRACKED
+            .replace("lps]\nyoungs-modulus = 70e3\npoisson-ratio = 0.3", law)
+            .replace(
+                "[cracks.start]\nsegment = { from = [-5.5, 0], to = [5.5, 0] }\n",
+                "",
+            )
+            .replace(
+                "min = [-12, -6], max = [12, 6]",
+                "min = [-20, -12], max = [20, 12]",
+            )
+            .replace("5e-3", "1e-2")
+            .replace(
+                "steps = [0.6, 0.7, 0.74, 0.76, 0.78, 0.8, 0.82, 0.84, 0.86]",
+                "duration = 1\nsteps = 50",
+            );
+        write(folder.path(), "s.toml", &typed);
+        let said = run(folder.path(), &["s.toml"]);
+        let from = said.find("bears a stress of about ").expect(&said) + 24;
+        let told: f64 = said[from..]
+            .split([')', ';'])
+            .next()
+            .unwrap()
+            .trim()
+            .parse()
+            .unwrap();
+        let load = column(&folder.path().join("out/s_history.csv"), "top_reaction_y");
+        let peak = load.iter().fold(0.0, |most: f64, x| most.max(*x)) / 40.0;
+        assert!((peak / told - 1.0).abs() < limit, "{law}: {peak} {told}");
+    }
+}

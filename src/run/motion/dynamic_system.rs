@@ -7,6 +7,7 @@ use crate::coupling::semidiscrete::behaviour::{
 };
 use crate::coupling::semidiscrete::{CoupledSystem, masses};
 use crate::fem::Locator;
+use crate::observe::report::number;
 use crate::observe::summary::Decision;
 use crate::peridynamics::bond_force::{BondKinematics, BondSoftening, Storage};
 use crate::peridynamics::critical_stretch as failure_stretch;
@@ -211,7 +212,8 @@ fn failure_text<const D: usize>(
     match (stretches, breaking.fracture.and_then(Fracture::energy)) {
         (Some(s), Some(g)) => {
             if let SofteningChoice::Soften(softening) = breaking.softening {
-                return softening_text(critical, softening, g, breaking.calibration);
+                let modulus = law.map(|law| law.linearised().tensor().uniaxial_modulus());
+                return softening_text(critical, softening, (g, modulus), breaking.calibration);
             }
             let takes = match breaking.calibration {
                 CalibrationSpec::Lattice => "bonds through a plane of the lattice take it",
@@ -235,11 +237,11 @@ fn failure_text<const D: usize>(
     }
 }
 
-/// Returns in words how bonds soften that would take the energy of a break at a `critical` stretch, that of the first lattice.
+/// Returns in words how bonds soften that would take the energy of a break at a `critical` stretch, that of the first lattice, and the strength of a body without a crack.
 fn softening_text(
     critical: Option<&BondThreshold>,
     softening: BondSoftening,
-    energy: f64,
+    (energy, modulus): (f64, Option<f64>),
     calibration: CalibrationSpec,
 ) -> String {
     let brittle = critical.map_or(f64::NAN, |critical| critical.at(0, [0; 2]));
@@ -248,8 +250,13 @@ fn softening_text(
         CalibrationSpec::Lattice => "planes of all directions take it in the mean",
         CalibrationSpec::Continuum => "bonds through a plane of a continuous body take it",
     };
+    // the bonds along a uniaxial stress soften first, and few others before it is largest
+    let strength = modulus.map_or(String::new(), |modulus| {
+        let stress = number(modulus * from);
+        format!("; pulled along one axis, a body without a crack bears a stress of about {stress}")
+    });
     format!(
-        "bonds soften along a line from the stretch {from:.3e} to {:.3e} and are through there, the fracture energy is {energy:e}: {takes}",
+        "bonds soften along a line from the stretch {from:.3e} to {:.3e} and are through there, the fracture energy is {energy:e}: {takes}{strength}",
         softening.ratio * from
     )
 }
