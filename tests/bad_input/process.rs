@@ -241,6 +241,7 @@ mesh.file.path = '{}'
 materials.stuff.lps = {{ youngs-modulus = 1, poisson-ratio = 0.1 }}
 peridynamics.horizon = 0.2
 zones.nonlocal.box = {{ min = [0.8, 0.3], max = [1.33, 0.61] }}
+zones.rim = 'mesh'
 voids.hole.inside.ball = {{ center = [9, 9], radius = 0.1 }}
 conditions.held.displacement = {{ on = 'fixed', x = 0, y = 0 }}
 conditions.weight.body-force.x = 1e-3

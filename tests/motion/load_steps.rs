@@ -395,7 +395,7 @@ inside.box = { min = [21, -1], max = [25, 13] }
 x = "0.1 * t"
 y = 0
 [solve.quasi-static]
-steps = 10
+steps = 8
 [output]
 vtu = false
 "#;
@@ -412,15 +412,20 @@ fn a_body_that_has_parted_ends_the_run_unless_it_is_to_go_on() {
     let parted = summary(&[]);
     assert_eq!(parted["ended"], "parted");
     let steps = parted["steps"].as_u64().unwrap();
-    assert!((2..10).contains(&steps), "{steps}");
+    assert!((2..8).contains(&steps), "{steps}");
     let rows = column(&folder.path().join("out/pulled_history.csv"), "step");
     assert_eq!(rows.last(), Some(&(steps as f64)));
     let whole = summary(&["--set", "solve.quasi-static.when-parted=continue"]);
     assert_eq!(whole["ended"], "finished");
-    assert_eq!(whole["steps"], 10);
-    assert_eq!(whole["broken_bonds"], parted["broken_bonds"]);
+    assert_eq!(whole["steps"], 8);
+    // a point that hangs between the parts by single bonds may go on to lose them
+    let broken = [&parted, &whole].map(|m| m["broken_bonds"].as_f64().unwrap());
+    assert!(
+        broken[0] <= broken[1] && broken[1] < 1.02 * broken[0],
+        "{broken:?}"
+    );
     let said = run(folder.path(), &["pulled.toml"]);
-    let left = format!("{} load steps are left", 10 - steps);
+    let left = format!("{} load steps are left", 8 - steps);
     assert!(said.contains(&left), "{said}");
 }
 

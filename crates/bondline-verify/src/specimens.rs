@@ -111,6 +111,7 @@ fn double_cantilever(a: f64, h: f64) -> f64 {
     h.powf(1.5) / (12_f64.sqrt() * (a + 0.673 * h))
 }
 
+// One function: a list.
 fn specimens(effort: Effort) -> Vec<Specimen> {
     let of = |name, scene, critical, runs| Specimen {
         name,

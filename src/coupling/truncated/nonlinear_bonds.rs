@@ -11,6 +11,7 @@ mod construction;
 mod counted_bonds;
 mod damage;
 mod own_bonds;
+mod softened_bonds;
 mod softening;
 
 use rayon::prelude::*;
@@ -18,7 +19,7 @@ use rayon::prelude::*;
 use breaking::{Breaking, Carrier};
 use counted_bonds::OwnBonds;
 pub(in crate::coupling) use own_bonds::ReachOfSeam;
-use softening::SeamSoftening;
+use softened_bonds::SeamSoftening;
 
 use super::{
     bond_kinematics::Part,

@@ -1,7 +1,7 @@
 //! Energy and damage of the bonds that a seam cuts.
 
 use super::breaking::Breaking;
-use super::softening::SeamSoftening;
+use super::softened_bonds::SeamSoftening;
 use super::{CHUNK, NonlinearSeam};
 use crate::{
     coupling::truncated::{bond_kinematics::Part, dilatation_state::States},
