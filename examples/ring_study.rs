@@ -48,7 +48,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             .condition("low", Condition::displacement("along x").y(0))
             .condition("side", Condition::displacement("along y").x(0))
             .solve(&Silent)?;
-        let widened = solution.displacement()?[0][0]; // of the node at (BORE, 0)
+        let at_bore = |x: &[f64; 3]| (x[0] - BORE).hypot(x[1]) < 1e-9 * BORE;
+        let node = solution.points().iter().position(at_bore);
+        let widened = solution.displacement()?[node.ok_or("no node")?][0];
         let (a, b) = (BORE * BORE, outer * outer);
         // Lamé's thick ring in plane stress
         let exact = PRESSURE * BORE / MODULUS * ((b + a) / (b - a) + POISSON);
