@@ -131,3 +131,32 @@ y = "-3e-4*y + 1e-4*x"
         );
     }
 }
+
+#[test]
+fn elements_between_a_rim_and_another_material_have_the_strain_of_their_own() {
+    // contracted alike across the stress, so that it is uniform
+    let case = Case::new(
+        r#"
+kinematics = "plane-stress"
+mesh.rectangle = { min = [0, 0], max = [2, 1], x = { cells = 20 }, y = { cells = 10 }, cell = "tri3" }
+materials.a.lps = { youngs-modulus = 100, poisson-ratio = 0.15, cells.box = { min = [0, 0], max = [1, 1] } }
+materials.b.lps = { youngs-modulus = 200, poisson-ratio = 0.3 }
+peridynamics = { horizon = 0.09, points.lattice.spacing = 0.03 }
+zones.nonlocal.box = { min = [0.25, 0.33], max = [0.97, 0.71] }
+conditions.left.displacement = { on = "left", x = 0 }
+conditions.bottom.symmetry.on = "bottom"
+conditions.right.traction = { on = "right", x = 1 }
+output.stresses = ["von-mises"]
+output.probes.i.at = [0.995, 0.5]
+"#,
+    );
+    let said = case.run(&[]).expect("it runs").to_string();
+    assert!(said.contains("a rim of"), "{said}");
+    let table = case.read("out/scene_probes.csv");
+    let mut rows = table.lines().map(|l| l.split(','));
+    let column = rows.next().expect("names").position(|name| name == "sxx");
+    let stress = rows.next().expect("numbers").nth(column.expect("stress"));
+    let stress: f64 = stress.expect("a number").parse().expect("a number");
+    // by an element across the border it was 0.53
+    assert!((stress - 1.0).abs() < 1e-9, "{stress}");
+}

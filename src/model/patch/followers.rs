@@ -16,11 +16,13 @@ const RINGS: usize = 12;
 /// Substitutions of rows into one another before those of the rim count as a circle.
 const PASSES: usize = 200;
 
-/// The nodes of the mesh that follow, with those of the element that each follows: the one of the least sum of weights in the first ring of cells that has any, and in the next.
+/// The nodes of the mesh that follow, with those of the element that each follows: the one of the least sum of weights in the first ring of cells that has any, and in the next. It is of the `material` of what is left of their own, whose
+/// strain another one has not.
 pub(super) fn of_mesh<const D: usize>(
     mesh: &Mesh<D>,
     cuts: &Cuts,
     is_held: &dyn Fn(u32) -> bool,
+    material: &dyn Fn(u32) -> u16,
 ) -> Result<Rows<D>, PatchError> {
     let (offsets, around) = mesh.node_cells();
     let cells = |n: u32| &around[offsets[n as usize] as usize..offsets[n as usize + 1] as usize];
@@ -34,6 +36,9 @@ pub(super) fn of_mesh<const D: usize>(
             continue;
         }
         let x = mesh.nodes[n as usize];
+        let left = cells(n).iter().filter(|&&c| !cuts.is_covered(c));
+        let own: Vec<u16> = left.map(|&c| material(c)).collect();
+        let may_lead = |c: u32| cuts.is_good(c) && own.contains(&material(c));
         let mut best: Option<(f64, Row<D>)> = None;
         let (mut seen, mut reached) = (vec![n], vec![n]);
         for _ in 0..RINGS {
@@ -43,7 +48,7 @@ pub(super) fn of_mesh<const D: usize>(
             let mut ring: Vec<u32> = ring.filter(|&c| !cuts.is_covered(c)).collect();
             ring.sort_unstable();
             ring.dedup();
-            for &c in ring.iter().filter(|&&c| cuts.is_good(c)) {
+            for &c in ring.iter().filter(|&&c| may_lead(c)) {
                 let Some(xi) = fem::reference_of(mesh, c as usize, &x) else {
                     continue;
                 };

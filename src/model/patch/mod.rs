@@ -95,7 +95,7 @@ pub fn embed<const D: usize>(
     for _ in 0..ABSORBED {
         patch.check_materials(material)?;
         patch.check_connected(mesh)?;
-        let found = embedded(mesh, &patch, is_held, lattice);
+        let found = embedded(mesh, &patch, (is_held, material), lattice);
         let Err(error) = &found else {
             return found;
         };
@@ -104,7 +104,7 @@ pub fn embed<const D: usize>(
             return found;
         }
     }
-    embedded(mesh, &patch, is_held, lattice)
+    embedded(mesh, &patch, (is_held, material), lattice)
 }
 
 /// Strips of elements that a rim takes in, at most.
@@ -114,7 +114,7 @@ const ABSORBED: usize = 60;
 fn embedded<const D: usize>(
     mesh: &Mesh<D>,
     patch: &PatchCells<D>,
-    is_held: &dyn Fn(u32) -> bool,
+    (is_held, material): (&dyn Fn(u32) -> bool, &dyn Fn(u32) -> u16),
     lattice: PatchLattice<D>,
 ) -> Result<Patched<D>, PatchError> {
     let (mesh, patch, replaced) = replaced::replaced(mesh, patch);
@@ -125,7 +125,8 @@ fn embedded<const D: usize>(
     }
     let sides = Sides::new(mesh, patch, &cuts);
     let is_held = |n: u32| is_held(sides.origin(n));
-    let mut rows = followers::of_mesh(&sides.mesh, &cuts, &is_held)?;
+    let material = |c: u32| material(replaced.origin(c));
+    let mut rows = followers::of_mesh(&sides.mesh, &cuts, &is_held, &material)?;
     rows.extend(followers::of_rim(patch)?);
     let tied = tie::rows(&sides.mesh, patch, &cuts);
     let (mut all, mut shares) = (rows.clone(), rows);

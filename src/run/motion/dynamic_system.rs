@@ -212,7 +212,10 @@ fn failure_text<const D: usize>(
     match (stretches, breaking.fracture.and_then(Fracture::energy)) {
         (Some(s), Some(g)) => {
             if let SofteningChoice::Soften(softening) = breaking.softening {
-                let modulus = law.map(|law| law.linearised().tensor().uniaxial_modulus());
+                // in space, and beyond the usual ratio, bodies bear more by a fifth and above
+                let is_known = D < 3 && softening.ratio <= 3.0;
+                let modulus = (law.filter(|_| is_known))
+                    .map(|law| law.linearised().tensor().uniaxial_modulus());
                 return softening_text(critical, softening, (g, modulus), breaking.calibration);
             }
             let takes = match breaking.calibration {
