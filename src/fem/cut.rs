@@ -1,43 +1,52 @@
 //! Quadrature rules of a part of a cell, from the moments of the part.
 
-use super::element::reference;
+use super::element::{jacobian, reference, relative_nodes};
 use super::locate::reference_of;
-use crate::mesh::{CellShape, CutCell, CutRule, Mesh};
-use crate::tensor::{Tensor, Vector, padded};
+use crate::mesh::{CellShape, CutCell, Mesh};
+use crate::tensor::{Tensor, Vector, determinant, padded};
 
-/// Returns the rules of a part of a cell with a constant Jacobian: a simplex, or a box along the axes.
+/// Size, centroid and second moment about it over the size, of a part of a cell: \[m^D\], \[m\], \[m²\].
+pub type CentralMoments<const D: usize> = (f64, Vector<D>, Tensor<D>);
+
+/// Returns the rules of what is left of a cell, by parts in each of which its Jacobian is constant: one part of a simplex, or of a box, whatever its axes are; several of a divided cell.
 ///
-/// The rule has two points along each axis, `c ± l_1 ± … ± l_D` of equal weight, with the centroid `c` and the columns `l_k` of a factor of the second moment
+/// The rule of a part has two points along each axis, `c ± l_1 ± … ± l_D` of equal weight, with the centroid `c` and the columns `l_k` of a factor of the second moment
 /// about it, `L Lᵀ`: positive, exact for polynomials of degree two, and off the axes, so that no mode of a box is without energy. A simplex has constant gradients, and one point for its stiffness.
 ///
-/// `volume` \[m^D\], `centroid` \[m\] and `second`, the second moment about the centroid over the volume \[m²\], are those of the part. `None` if no element lives on the cell.
-pub fn rule_of_part<const D: usize>(
+/// `None` if no element lives on the cell.
+pub fn rule_of_parts<const D: usize>(
     mesh: &Mesh<D>,
     c: usize,
-    (volume, centroid, second): (f64, Vector<D>, Tensor<D>),
+    parts: &[CentralMoments<D>],
 ) -> Option<CutCell> {
     let cell = reference(mesh, c)?;
-    let whole = mesh.cell_volume(c).abs();
-    let fraction = volume / whole;
-    let all: f64 = cell.stiffness.iter().map(|point| point.1).sum();
-    let at = |x: Vector<D>, part: f64| -> Option<([f64; 3], f64)> {
-        Some((padded(&reference_of(mesh, c, &x)?), fraction * all * part))
+    let (_, nodes) = relative_nodes(mesh, c);
+    let is_constant = mesh.embedded.is_divided(c)
+        || matches!(
+            mesh.shapes[c],
+            CellShape::Line2 | CellShape::Tri3 | CellShape::Tet4
+        );
+    let mut rules = CutCell::default();
+    let at = |x: &Vector<D>, size: f64| -> Option<([f64; 3], f64)> {
+        let xi = padded(&reference_of(mesh, c, x)?);
+        let stretch = determinant(&jacobian(&nodes[..cell.nodes()], &(cell.gradients)(&xi)));
+        Some((xi, size / stretch.abs()))
     };
-    let part = 1.0 / f64::from(1 << D);
-    let mass: Option<CutRule> = (places_of_part(centroid, &second))
-        .into_iter()
-        .map(|x| at(x, part))
-        .collect();
-    let mass = mass?;
-    let stiffness = match mesh.shapes[c] {
-        CellShape::Line2 | CellShape::Tri3 | CellShape::Tet4 => vec![at(centroid, 1.0)?],
-        _ => mass.clone(),
-    };
-    Some(CutCell {
-        fraction,
-        stiffness,
-        mass,
-    })
+    for (size, centroid, second) in parts {
+        for x in places_of_part(*centroid, second) {
+            // of a divided cell it may lie in the part beside
+            rules.mass.push(at(&x, size / f64::from(1 << D))?);
+        }
+        if is_constant {
+            rules.stiffness.push(at(centroid, *size)?);
+        }
+        rules.fraction += size;
+    }
+    rules.fraction /= mesh.cell_volume(c).abs();
+    if !is_constant {
+        rules.stiffness = rules.mass.clone();
+    }
+    Some(rules)
 }
 
 /// Places whose mean is exact for polynomials of degree two over a part with this centroid \[m\] and second moment about it, over its size \[m²\].

@@ -1,7 +1,7 @@
 //! Quadrature points in space, block rows of an element's stiffness, and fields inside of a cell.
 
 use super::cell::{MAX_NODES, PerNode, ReferenceCell, Rule};
-use super::reference_cell;
+use super::{divided, reference_cell};
 use crate::mesh::Mesh;
 use crate::tensor::{Tensor, Tensor4, Vector, inverse, padded};
 
@@ -29,7 +29,12 @@ pub(super) fn reference<const D: usize>(
     mesh: &Mesh<D>,
     c: usize,
 ) -> Option<&'static ReferenceCell> {
-    reference_cell(mesh.shapes[c]).filter(|cell| cell.shape.dimension() == D)
+    let shape = mesh.shapes[c];
+    let cell = match mesh.embedded.is_divided(c) {
+        false => reference_cell(shape),
+        true => divided::of(shape),
+    };
+    cell.filter(|cell| cell.shape.dimension() == D)
 }
 
 /// Positions of the nodes relative to the first, which keeps digits of small cells far from the origin.

@@ -1,6 +1,7 @@
 //! Consistent nodal forces of tractions and body forces.
 
 use super::cell::{ReferenceCell, Rule, RulePoint};
+use super::divided;
 use super::element::{for_each_point, shape_values};
 use super::locate::reference_of;
 use super::{line2, line3, quad4, quad8, tri3, tri6};
@@ -49,10 +50,14 @@ pub fn facet_points<const D: usize>(
         panic!("a facet of {nodes} nodes in {D} dimensions has no quadrature");
     };
     let corners = facet_corners::<D>(facet);
-    if let Some(rule) = mesh.embedded.cut_facet(corners) {
-        // a simplex, or a rectangle along the axes: the local coordinates are affine
-        for (x, weight) in rule {
-            let xi = affine_coordinates(mesh, cell, corners, x);
+    if let Some(part) = mesh.embedded.cut_facet(corners) {
+        // the local coordinates are affine unless a quadrilateral is divided
+        let cell = match part.is_divided && corners.len() == 4 {
+            true => &divided::QUADRILATERAL,
+            false => cell,
+        };
+        for (x, weight) in &part.rule {
+            let xi = local_coordinates(mesh, cell, corners, x);
             let point = facet_point(mesh, facet, cell, &(xi, 0.0));
             visit(&FacetPoint {
                 weight: *weight,
@@ -66,19 +71,24 @@ pub fn facet_points<const D: usize>(
     }
 }
 
-/// Local coordinates of a place on a facet whose map is affine.
-fn affine_coordinates<const D: usize>(
+/// Local coordinates of a place on a facet whose map is affine, or which is divided.
+fn local_coordinates<const D: usize>(
     mesh: &Mesh<D>,
     cell: &ReferenceCell,
     corners: &[u32],
-    x: &Vector<D>,
+    position: &Vector<D>,
 ) -> [f64; 3] {
     let place = |a: usize| mesh.nodes[corners[a] as usize];
+    if std::ptr::eq(cell, &divided::QUADRILATERAL) {
+        let x: Vec<Vector<D>> = (0..corners.len()).map(place).collect();
+        let xi = divided::coordinates(cell, &x, position);
+        return xi.map_or(cell.centre, |xi| [xi[0], xi[1], 0.0]);
+    }
     let last = corners.len() - 1;
     // the corners that the first has an edge to
     let ends: &[usize] = if last == 1 { &[1] } else { &[1, last] };
     let mut xi = cell.corners[0];
-    let rest = x - place(0);
+    let rest = position - place(0);
     for &end in ends {
         // edges of rectangles are normal to one another, those of triangles are made so
         let along = place(end) - place(0);
@@ -148,7 +158,7 @@ fn facet_point<const D: usize>(
 }
 
 /// The unit normal of a facet with these tangents: on the right of `p` in 2D, along `p × q` in 3D.
-fn normal<const D: usize>(p: &Vector<D>, q: &Vector<D>) -> Vector<D> {
+pub(super) fn normal<const D: usize>(p: &Vector<D>, q: &Vector<D>) -> Vector<D> {
     let normal: Vector<D> = match D {
         2 => Vector::from_fn(|k, _| if k == 0 { p[1] } else { -p[0] }),
         3 => Vector::from_fn(|k, _| {

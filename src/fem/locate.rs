@@ -1,6 +1,7 @@
 //! From a point in space to the cell that holds it and its shape functions there.
 
 use super::cell::PerNode;
+use super::divided;
 use super::element::{jacobian, reference, relative_nodes};
 use crate::mesh::Mesh;
 use crate::tensor::{Vector, inverse, padded};
@@ -21,6 +22,9 @@ pub fn reference_of<const D: usize>(mesh: &Mesh<D>, c: usize, x: &Vector<D>) -> 
     let target = x - origin;
     if !target.iter().all(|t| t.is_finite()) {
         return None;
+    }
+    if mesh.embedded.is_divided(c) {
+        return divided::coordinates(cell, nodes, &target);
     }
     let mut xi = Vector::from_fn(|i, _| cell.centre[i]);
     for _ in 0..30 {

@@ -40,6 +40,7 @@
 //! | `element.rs` | quadrature points in space, block rows of an element's stiffness, fields at a point |
 //! | `superconvergent.rs` | the displacement gradient anywhere in a cell, from where it is most accurate |
 //! | `cut.rs` | quadrature rules of a part of a cell |
+//! | `divided.rs` | quadrilaterals and hexahedra that are linear in simplices around their middle |
 //! | `crack_band.rs` | the width in which a law that softens localises in a cell |
 //! | `nonlinear.rs`, `nonlinear/` | elements of a law that is not linear: their excess over the linear ones, and their history variables |
 //! | `load.rs` | consistent nodal forces of tractions and body forces |
@@ -53,6 +54,7 @@ mod body;
 mod cell;
 mod crack_band;
 mod cut;
+mod divided;
 mod element;
 mod hex20;
 mod hex8;
@@ -78,7 +80,8 @@ mod second_order_tests;
 pub use body::{FemError, check};
 pub use cell::{MAX_NODES, PerNode, ReferenceCell, Rule, RulePoint};
 pub use crack_band::{CellBandError, banded_law, crack_band};
-pub use cut::{places_of_part, rule_of_part};
+pub use cut::{places_of_part, rule_of_parts};
+pub use divided::may_be_divided;
 pub use element::{
     QuadraturePoint, cell_volume, displacement_gradient, displacement_gradient_at,
     displacement_gradient_at_centre, for_each_point, quadrature, quadrature_of, row_at,

@@ -25,11 +25,22 @@ pub struct CutCell {
     pub mass: CutRule,
 }
 
+/// The part of a facet that belongs to the surface of the body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CutFacet<const D: usize> {
+    /// A quadrature rule: places \[m\] and weights [m^(D−1)].
+    pub rule: Vec<(Vector<D>, f64)>,
+    /// True if its cell is divided.
+    pub is_divided: bool,
+}
+
 /// Changes that an embedded patch makes to a mesh; empty in a mesh without one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Embedded<const D: usize> {
     /// Cells of which only a part belongs to the body.
     pub cut: FxHashMap<u32, CutCell>,
+    /// Cut quadrilaterals and hexahedra whose shape functions are linear in simplices around their middle.
+    pub divided: FxHashSet<u32>,
     /// Nodes that follow others, with weights that add up to one and are exact for affine fields. The others follow none.
     pub followers: BTreeMap<u32, Vec<(u32, f64)>>,
     /// Rows by which nodes that follow hand on masses and loads, where it is not those of their displacement: as many, or none.
@@ -37,7 +48,7 @@ pub struct Embedded<const D: usize> {
     /// Facets of one cell only that are no surface of the body, by their sorted corners.
     pub(super) inner: FxHashSet<[u32; 4]>,
     /// Facets of which only a part belongs to the surface, by their sorted corners, with a rule for the part.
-    pub(super) cut_facets: FxHashMap<[u32; 4], Vec<(Vector<D>, f64)>>,
+    pub(super) cut_facets: FxHashMap<[u32; 4], CutFacet<D>>,
     /// The part of each cell of the patch that the surface of the body cuts, as simplices; corners beyond `D + 1` have no meaning.
     pub pieces: FxHashMap<u32, Vec<[Vector<D>; 4]>>,
     /// The surface of the body in cells that it crosses, by sorted nodes: these belong to no cell.
@@ -61,6 +72,7 @@ impl<const D: usize> Default for Embedded<D> {
     fn default() -> Self {
         Self {
             cut: FxHashMap::default(),
+            divided: FxHashSet::default(),
             followers: BTreeMap::new(),
             shares: BTreeMap::new(),
             inner: FxHashSet::default(),
@@ -123,6 +135,12 @@ impl<const D: usize> Embedded<D> {
         self.surface.values()
     }
 
+    /// Returns true if a cell is divided.
+    #[inline]
+    pub fn is_divided(&self, c: usize) -> bool {
+        !self.divided.is_empty() && self.divided.contains(&(c as u32))
+    }
+
     /// Returns true if a patch is embedded in the mesh.
     pub fn has_patch(&self) -> bool {
         !self.covered.cells.is_empty()
@@ -142,21 +160,21 @@ impl<const D: usize> Embedded<D> {
         }
     }
 
-    /// The rule of a facet with these corners, where only a part of it belongs to the surface: places and weights.
-    pub fn cut_facet(&self, corners: &[u32]) -> Option<&[(Vector<D>, f64)]> {
+    /// The part of a facet with these corners, where only a part of it belongs to the surface.
+    pub fn cut_facet(&self, corners: &[u32]) -> Option<&CutFacet<D>> {
         match self.cut_facets.is_empty() {
             true => None,
             false => {
                 let facet = key(corners.iter().copied());
-                self.cut_facets.get(&facet).map(Vec::as_slice)
+                self.cut_facets.get(&facet)
             }
         }
     }
 
-    /// Leaves of a facet, by its corners, a part with this rule of places \[m\] and weights [m^(D−1)].
-    pub fn cut_facet_to(&mut self, corners: &[u32], rule: Vec<(Vector<D>, f64)>) {
+    /// Leaves a part of a facet, by its corners.
+    pub fn cut_facet_to(&mut self, corners: &[u32], part: CutFacet<D>) {
         let facet = key(corners.iter().copied());
-        self.cut_facets.insert(facet, rule);
+        self.cut_facets.insert(facet, part);
     }
 
     /// Takes a facet, by its corners, out of the surface of the body.

@@ -49,7 +49,7 @@ mod vtu_data;
 mod xml;
 
 pub use cell_shape::CellShape;
-pub use embedded::{Covered, CutCell, CutRule, Embedded};
+pub use embedded::{Covered, CutCell, CutFacet, CutRule, Embedded};
 pub use error::{MeshError, Place};
 pub use order::{Order, Tie, facet_corners};
 pub use parts::MeshParts;

@@ -69,17 +69,30 @@ pub(crate) struct Ties {
 impl Ties {
     pub fn new<const D: usize>(mesh: &Mesh<D>) -> Self {
         let mut ties = Self::default();
-        for (&node, followed) in &mesh.embedded.followers {
-            ties.add(node, followed.clone());
-        }
         let followed = &mesh.embedded.followers;
+        let tied = mesh.ties();
+        let middles: FxHashMap<u32, [u32; 2]> =
+            tied.iter().map(|tie| (tie.node, tie.ends)).collect();
+        let halves = |n: u32| middles[&n].map(|end| (end, 0.5));
         let through = |(n, w): (u32, f64)| match followed.get(&n) {
             Some(others) => others.iter().map(|&(other, v)| (other, v * w)).collect(),
             None => vec![(n, w)],
         };
-        for tie in mesh.ties() {
-            let ends = tie.ends.map(|end| (end, 0.5)).into_iter();
-            ties.add(tie.node, ends.flat_map(through).collect());
+        for (&node, followed) in followed {
+            // an element of second order that a node follows may have such a middle itself
+            let row = followed
+                .iter()
+                .flat_map(|&(n, w)| match middles.contains_key(&n) {
+                    true => halves(n).map(|(end, v)| (end, v * w)).to_vec(),
+                    false => vec![(n, w)],
+                });
+            ties.add(node, row.collect());
+        }
+        for tie in &tied {
+            ties.add(
+                tie.node,
+                halves(tie.node).into_iter().flat_map(through).collect(),
+            );
         }
         ties
     }

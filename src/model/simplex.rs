@@ -244,7 +244,7 @@ impl<const D: usize> Cells<D> {
     }
 }
 
-/// The corners of a cell of a mesh as simplices: a quadrilateral as two triangles, a hexahedron with plane faces as six tetrahedra around its diagonal. Any other solid is divided from its centre, a bent face from
+/// The corners of a cell of a mesh as simplices: a quadrilateral as two triangles, a hexahedron with plane faces as six tetrahedra around its diagonal. A divided quadrilateral, and any other solid, is divided from its centre, a bent face from
 /// its own: the volume of a trilinear hexahedron is that of these 24 tetrahedra [Grandy 1997, UCRL-ID-128886], and neighbours divide their face alike.
 pub(in crate::model) fn simplices_of<const D: usize>(mesh: &Mesh<D>, c: usize) -> Vec<Simplex<D>> {
     match mesh.embedded.pieces.get(&(c as u32)) {
@@ -270,6 +270,7 @@ pub(in crate::model) fn whole_simplices<const D: usize>(
     match mesh.shapes[c].linear() {
         CellShape::Vertex => Vec::new(),
         CellShape::Line2 | CellShape::Tri3 | CellShape::Tet4 => vec![Simplex::of(&x)],
+        CellShape::Quad4 if mesh.embedded.is_divided(c) => around_middle(&x),
         CellShape::Quad4 => {
             let parts = [of(&[0, 1, 2]), of(&[0, 2, 3])];
             let others = [of(&[1, 2, 3]), of(&[1, 3, 0])];
@@ -280,17 +281,19 @@ pub(in crate::model) fn whole_simplices<const D: usize>(
                 false => others.to_vec(),
             }
         }
-        CellShape::Hex8 if has_plane_faces(CellShape::Hex8, &x) => [
-            [0, 1, 2, 6],
-            [0, 2, 3, 6],
-            [0, 3, 7, 6],
-            [0, 7, 4, 6],
-            [0, 4, 5, 6],
-            [0, 5, 1, 6],
-        ]
-        .iter()
-        .map(|corners| of(corners))
-        .collect(),
+        CellShape::Hex8 if !mesh.embedded.is_divided(c) && has_plane_faces(CellShape::Hex8, &x) => {
+            [
+                [0, 1, 2, 6],
+                [0, 2, 3, 6],
+                [0, 3, 7, 6],
+                [0, 7, 4, 6],
+                [0, 4, 5, 6],
+                [0, 5, 1, 6],
+            ]
+            .iter()
+            .map(|corners| of(corners))
+            .collect()
+        }
         solid => {
             let centre = x.iter().sum::<Vector<D>>() / x.len() as f64;
             let faces = solid.facets().iter();
@@ -322,7 +325,14 @@ fn has_plane_faces<const D: usize>(shape: CellShape, x: &[Vector<D>]) -> bool {
     })
 }
 
-/// A facet as simplices.
+/// A quadrilateral as four triangles around the mean of its corners.
+pub(in crate::model) fn around_middle<const D: usize>(x: &[Vector<D>]) -> Vec<Simplex<D>> {
+    let middle = x.iter().sum::<Vector<D>>() / x.len() as f64;
+    let triangle = |a: usize| Simplex::of(&[x[a], x[(a + 1) % x.len()], middle]);
+    (0..x.len()).map(triangle).collect()
+}
+
+/// A facet as simplices: a quadrilateral as two triangles.
 pub(in crate::model) fn facet_simplices<const D: usize>(
     mesh: &Mesh<D>,
     facet: &[u32],

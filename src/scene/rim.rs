@@ -194,7 +194,7 @@ fn told<const D: usize>(patched: &Patched<D>, edge: f64, why: &str) -> Decision 
     let Replaced {
         linear,
         moved,
-        halved,
+        divided,
         ..
     } = &patched.replaced;
     let mut replaced = match linear {
@@ -205,9 +205,9 @@ fn told<const D: usize>(patched: &Patched<D>, edge: f64, why: &str) -> Decision 
         let moved = number(*moved);
         replaced += &format!(", with straight sides, which move their surfaces by up to {moved}");
     }
-    replaced += &match halved.len() {
+    replaced += &match divided {
         0 => String::new(),
-        n => format!(", {n} quadrilaterals are two triangles each there"),
+        n => format!(", {n} of them are divided about their middle"),
     };
     Decision {
         choice: format!(

@@ -1,4 +1,4 @@
-//! Nonlocal zones with a rim of their own, `zones.rim = "own"`, in meshes of triangles, quadrilaterals, tetrahedra and lines that know nothing of the lattice.
+//! Nonlocal zones with a rim of their own, `zones.rim = "own"`, in meshes of triangles, quadrilaterals, tetrahedra, hexahedra and lines that know nothing of the lattice.
 
 use bondline::{Region, SceneBuilder};
 
@@ -6,6 +6,7 @@ mod affine;
 mod bad_input;
 mod convergence;
 mod crack;
+mod hexahedra;
 mod meshes;
 mod quadrilaterals;
 mod shown;

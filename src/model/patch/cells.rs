@@ -26,7 +26,6 @@ const MOST: f64 = 2e8;
 pub(super) type Index<const D: usize> = [i32; D];
 
 /// Cells of a patch.
-#[derive(Clone)]
 pub(super) struct PatchCells<const D: usize> {
     pub cells: Cells<D>,
     /// Cells that hold points.
@@ -351,22 +350,6 @@ impl<const D: usize> PatchCells<D> {
             }
         }
         pieces
-    }
-
-    /// The patch in a mesh of which some cells are halves: of each the first has its number, the second ones are the last cells.
-    pub fn in_halves(&self, mesh: &Mesh<D>, halved: &[u32]) -> Self {
-        let mut patch = self.clone();
-        for own in patch.held.values_mut() {
-            own.retain(|part| halved.binary_search(&part.0).is_err());
-        }
-        let second = mesh.cell_count() - halved.len()..mesh.cell_count();
-        for c in halved.iter().map(|&c| c as usize).chain(second) {
-            for (index, volume) in parts(mesh, &patch.cells, patch.limits, c) {
-                let own = patch.held.entry(index).or_default();
-                own.push((c as u32, volume));
-            }
-        }
-        patch
     }
 
     /// Position of a node of the lattice's cells.

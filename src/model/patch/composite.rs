@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     fem,
-    mesh::{CellShape, Covered, Facet, Mesh, boundary::BoundaryFacet, facet_corners},
+    mesh::{CellShape, Covered, CutFacet, Facet, Mesh, boundary::BoundaryFacet, facet_corners},
 };
 
 /// Part of a face of the patch that may be outside a set of facets which holds it, by rounding.
@@ -107,7 +107,11 @@ impl<'s, const D: usize> Composite<'s, D> {
         for &c in &left {
             cell[c as usize] = origin.len() as u32;
             if let Some(rule) = cuts.rule(c) {
-                mesh.embedded.cut.insert(origin.len() as u32, rule.clone());
+                let number = origin.len() as u32;
+                mesh.embedded.cut.insert(number, rule.clone());
+                if before.embedded.is_divided(c as usize) {
+                    mesh.embedded.divided.insert(number);
+                }
             }
             let nodes: Vec<u32> = (sides.mesh.cell(c as usize).iter())
                 .map(|&n| node[n as usize])
@@ -161,7 +165,11 @@ impl<'s, const D: usize> Composite<'s, D> {
             match surface.faces.get(&face) {
                 None => embedded.hide(&nodes),
                 Some(part) if part.size < (1.0 - HELD) * size => {
-                    embedded.cut_facet_to(&nodes, part.rule());
+                    let part = CutFacet {
+                        rule: part.rule(),
+                        is_divided: false,
+                    };
+                    embedded.cut_facet_to(&nodes, part);
                 }
                 Some(_) => {}
             }
@@ -185,7 +193,13 @@ impl<'s, const D: usize> Composite<'s, D> {
             let own: Facet = renumbered(facet.cell, corners);
             match facet.is_gone {
                 true => embedded.hide(&own),
-                false => embedded.cut_facet_to(&own, facet.left.rule()),
+                false => {
+                    let part = CutFacet {
+                        rule: facet.left.iter().flat_map(PartMoments::rule).collect(),
+                        is_divided: before.embedded.is_divided(facet.cell as usize),
+                    };
+                    embedded.cut_facet_to(&own, part);
+                }
             }
             self.patched.covered.insert(corners.clone());
         }
@@ -324,7 +338,7 @@ fn cut_patch_cells<const D: usize>(before: &Mesh<D>, patch: &PatchCells<D>, mesh
         let pieces = patch.pieces(before, index);
         let mut part = PartMoments::about(patch.cells.centre(index));
         pieces.iter().for_each(|piece| part.add(piece));
-        if let Some(rule) = fem::rule_of_part(mesh, c, part.central()) {
+        if let Some(rule) = fem::rule_of_parts(mesh, c, &[part.central()]) {
             mesh.embedded.cut.insert(c as u32, rule);
         }
         let pieces = pieces.iter().map(|piece| piece.corners).collect();

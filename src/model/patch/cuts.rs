@@ -37,16 +37,16 @@ impl Cuts {
             let c = met[k] as usize;
             let (outside, inside) = parts(mesh, patch, c);
             let whole = mesh.cell_volume(c).abs();
-            if outside.size <= NOTHING * whole {
+            let size: f64 = outside.iter().map(|part| part.size).sum();
+            if size <= NOTHING * whole {
                 return Ok(Some((met[k], None)));
             }
             if inside <= NOTHING * whole {
                 return Ok(None);
             }
-            let rule = may_be_cut(mesh, c)
-                .then(|| fem::rule_of_part(mesh, c, outside.central()))
-                .flatten();
-            match rule {
+            let central: Vec<_> = outside.iter().map(PartMoments::central).collect();
+            let rule = may_be_cut(mesh, c).then(|| fem::rule_of_parts(mesh, c, &central));
+            match rule.flatten() {
                 Some(rule) => Ok(Some((met[k], Some(rule)))),
                 None => Err(PatchError::Kind {
                     cell: c,
@@ -89,11 +89,21 @@ impl Cuts {
     }
 }
 
-/// The part of a cell outside the patch, and the volume inside.
-fn parts<const D: usize>(mesh: &Mesh<D>, patch: &PatchCells<D>, c: usize) -> (PartMoments<D>, f64) {
-    let mut outside = PartMoments::about(mesh.centroid(c));
+/// The part of a cell outside the patch, of a divided one by its simplices, and the volume inside.
+fn parts<const D: usize>(
+    mesh: &Mesh<D>,
+    patch: &PatchCells<D>,
+    c: usize,
+) -> (Vec<PartMoments<D>>, f64) {
+    let is_divided = mesh.embedded.is_divided(c);
+    let mut parts = Vec::new();
     let mut inside = 0.0;
     for simplex in simplices_of(mesh, c) {
+        if is_divided || parts.is_empty() {
+            parts.push(PartMoments::about(mesh.centroid(c)));
+        }
+        let outside = parts.last_mut().expect("a part was pushed");
+
         patch.cells.dice(
             &simplex,
             &|_, _| true,
@@ -103,18 +113,28 @@ fn parts<const D: usize>(mesh: &Mesh<D>, patch: &PatchCells<D>, c: usize) -> (Pa
             },
         );
     }
-    (outside, inside)
+    parts.retain(|part| part.size > 0.0);
+    (parts, inside)
 }
 
-/// Returns true if a cell may be cut: its shape functions are polynomials in space.
-pub(super) fn may_be_cut<const D: usize>(mesh: &Mesh<D>, c: usize) -> bool {
-    let shape = mesh.shapes[c];
-    match shape {
+/// Returns true if a cell may be cut: its shape functions are polynomials in space, or in each of its simplices.
+fn may_be_cut<const D: usize>(mesh: &Mesh<D>, c: usize) -> bool {
+    match mesh.shapes[c] {
         CellShape::Line2 | CellShape::Tri3 | CellShape::Tet4 => true,
-        CellShape::Quad4 => is_parallelogram(mesh, mesh.cell(c)),
-        CellShape::Hex8 => (0..shape.facets().len() as u8)
-            .all(|local| is_parallelogram(mesh, &mesh.facet((c as u32, local)).nodes)),
+        CellShape::Quad4 | CellShape::Hex8 => match mesh.embedded.is_divided(c) {
+            true => fem::may_be_divided(mesh, c),
+            false => has_constant_jacobian(mesh, c),
+        },
         _ => false,
+    }
+}
+
+/// Returns true if a quadrilateral or a hexahedron is a parallelogram or a parallelepiped.
+pub(super) fn has_constant_jacobian<const D: usize>(mesh: &Mesh<D>, c: usize) -> bool {
+    match mesh.shapes[c] {
+        CellShape::Quad4 => is_parallelogram(mesh, mesh.cell(c)),
+        shape => (0..shape.facets().len() as u8)
+            .all(|local| is_parallelogram(mesh, &mesh.facet((c as u32, local)).nodes)),
     }
 }
 

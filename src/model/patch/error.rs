@@ -52,9 +52,9 @@ pub enum PatchError {
         /// Position of one of them \[m\].
         position: Vec<f64>,
     },
-    /// The outer face of the rim cuts a cell of a kind that it may not.
+    /// The outer face of the rim cuts a cell with a negative part about its middle.
     #[error(
-        "cell {cell}, a {shape:?}, at {position:?}, is cut by the rim of the zone; only lines, triangles, quadrilaterals, tetrahedra and parallelepipeds may be"
+        "cell {cell}, a {shape:?}, at {position:?}, is cut by the rim of the zone and is too distorted for that; move its nodes apart, or move the zone"
     )]
     Kind {
         /// Number of the cell.

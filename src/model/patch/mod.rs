@@ -3,7 +3,7 @@
 //! | file | content |
 //! |---|---|
 //! | `cells.rs` | cells of the zone, the rim around them, and the faces Γ of the rim |
-//! | `replaced.rs` | cells of second order that the patch meets, linear with straight sides; quadrilaterals that it cuts, two triangles |
+//! | `replaced.rs` | cells of second order that the patch meets, linear with straight sides; quadrilaterals and hexahedra that it cuts, divided |
 //! | `cuts.rs` | elements that Γ cuts: what is left of them |
 //! | `tie.rs` | the displacement of the nodes of Γ, by a dual mortar |
 //! | `followers.rs` | nodes that no good element holds |
@@ -117,16 +117,15 @@ fn embedded<const D: usize>(
     (is_held, material): (&dyn Fn(u32) -> bool, &dyn Fn(u32) -> u16),
     lattice: PatchLattice<D>,
 ) -> Result<Patched<D>, PatchError> {
-    let (mesh, patch, replaced) = replaced::replaced(mesh, patch);
-    let (mesh, patch) = (mesh.as_ref(), patch.as_ref());
+    let (mesh, replaced) = replaced::replaced(mesh, patch);
+    let mesh = mesh.as_ref();
     let cuts = Cuts::new(mesh, patch)?;
     if lattice.may_part {
         sides::check_elements(mesh, patch, &cuts)?;
     }
     let sides = Sides::new(mesh, patch, &cuts);
     let is_held = |n: u32| is_held(sides.origin(n));
-    let material = |c: u32| material(replaced.origin(c));
-    let mut rows = followers::of_mesh(&sides.mesh, &cuts, &is_held, &material)?;
+    let mut rows = followers::of_mesh(&sides.mesh, &cuts, &is_held, material)?;
     rows.extend(followers::of_rim(patch)?);
     let tied = tie::rows(&sides.mesh, patch, &cuts);
     let (mut all, mut shares) = (rows.clone(), rows);
@@ -147,9 +146,6 @@ fn embedded<const D: usize>(
             position: patched.mesh.nodes[n as usize].iter().copied().collect(),
             volume,
         });
-    }
-    for c in &mut patched.origin {
-        *c = replaced.origin(*c);
     }
     Ok(Patched {
         replaced,

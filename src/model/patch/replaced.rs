@@ -1,17 +1,14 @@
-//! Cells that a patch replaces before it cuts: those of second order that it meets by linear ones with straight sides, and quadrilaterals that it may not cut by two triangles.
+//! Cells that a patch replaces before it cuts: those of second order that it meets by linear ones with straight sides, and quadrilaterals and hexahedra by divided ones.
 //!
-//! The sides of a quadrilateral are straight, as those of its triangles are: the cells beside it stay as they are, and affine fields exact.
+//! The shape functions of general quadrilaterals and hexahedra are no polynomials in space. Divided about their middle they are linear in each part ([`crate::fem`], `divided.rs`), and neighbours that are whole stay as they are.
 
 use std::borrow::Cow;
 
 use super::{
     cells::PatchCells,
-    cuts::{NOTHING, may_be_cut},
+    cuts::{NOTHING, has_constant_jacobian},
 };
-use crate::{
-    mesh::{CellShape, Mesh},
-    tensor::Vector,
-};
+use crate::mesh::{CellShape, Mesh};
 
 /// Cells that were replaced.
 #[derive(Clone, Debug, Default)]
@@ -20,44 +17,27 @@ pub struct Replaced {
     pub linear: usize,
     /// Distance \[m\] by which nodes in the middle of their edges moved, at most: that of a curved side from a straight one.
     pub moved: f64,
-    /// Quadrilaterals that became two triangles, ascending: the first has the number of the quadrilateral, the second ones are the last cells, in this order.
-    pub halved: Vec<u32>,
-    /// Number of cells before.
-    before: usize,
+    /// Quadrilaterals and hexahedra that are divided about their middle.
+    pub divided: usize,
 }
 
-impl Replaced {
-    /// The cell of the mesh before that a cell is, or is a half of.
-    pub(super) fn origin(&self, c: u32) -> u32 {
-        match (c as usize).checked_sub(self.before) {
-            Some(second) => self.halved[second],
-            None => c,
-        }
-    }
-}
-
-/// The mesh with what replaces cells that the patch meets, and the patch in that mesh.
+/// The mesh with what replaces cells that the patch meets; its nodes and cells keep their numbers.
 pub(super) fn replaced<'m, const D: usize>(
     mesh: &'m Mesh<D>,
-    patch: &'m PatchCells<D>,
-) -> (Cow<'m, Mesh<D>>, Cow<'m, PatchCells<D>>, Replaced) {
-    let mut found = Replaced {
-        before: mesh.cell_count(),
-        ..Replaced::default()
-    };
-    let (mut mesh, mut patch) = (Cow::Borrowed(mesh), Cow::Borrowed(patch));
-    let inside = inside(&mesh, &patch);
+    patch: &PatchCells<D>,
+) -> (Cow<'m, Mesh<D>>, Replaced) {
+    let mut found = Replaced::default();
+    let mut mesh = Cow::Borrowed(mesh);
+    let inside = inside(&mesh, patch);
     if mesh.has_quadratic_cells() {
         straighten(mesh.to_mut(), &inside, &mut found);
     }
-    found.halved = (0..found.before as u32)
-        .filter(|&c| to_halve(&mesh, c as usize, inside[c as usize]))
-        .collect();
-    if !found.halved.is_empty() {
-        halve(mesh.to_mut(), &found.halved);
-        patch = Cow::Owned(patch.in_halves(&mesh, &found.halved));
+    let divided = to_divide(&mesh, &inside);
+    if !divided.is_empty() {
+        found.divided = divided.len();
+        mesh.to_mut().embedded.divided.extend(divided);
     }
-    (mesh, patch, found)
+    (mesh, found)
 }
 
 /// Volume of each cell in the patch, none of those that it does not meet.
@@ -91,67 +71,20 @@ fn straighten<const D: usize>(mesh: &mut Mesh<D>, inside: &[Option<f64>], found:
     mesh.linearise(|c| is_met[c]);
 }
 
-/// Returns true if a cell, of which this volume lies in the patch, is a quadrilateral that has to be two triangles.
-fn to_halve<const D: usize>(mesh: &Mesh<D>, c: usize, inside: Option<f64>) -> bool {
-    let Some(inside) = inside.filter(|_| mesh.shapes[c] == CellShape::Quad4) else {
-        return false;
+/// Quadrilaterals and hexahedra to divide: all that the patch cuts, if one of them is neither a parallelogram nor a parallelepiped. Cells that share a cut face have to have the same displacement there.
+fn to_divide<const D: usize>(mesh: &Mesh<D>, inside: &[Option<f64>]) -> Vec<u32> {
+    let is_cut = |c: &u32| {
+        let c = *c as usize;
+        let is_kind = matches!(mesh.shapes[c], CellShape::Quad4 | CellShape::Hex8);
+        let Some(inside) = inside[c].filter(|_| is_kind) else {
+            return false;
+        };
+        let whole = mesh.cell_volume(c).abs();
+        inside.min(whole - inside) > NOTHING * whole
     };
-    let whole = mesh.cell_volume(c).abs();
-    inside.min(whole - inside) > NOTHING * whole && !may_be_cut(mesh, c)
-}
-
-/// Makes two triangles of quadrilaterals; sets of cells hold both.
-fn halve<const D: usize>(mesh: &mut Mesh<D>, cells: &[u32]) {
-    let old = std::mem::take(&mut mesh.connectivity);
-    let ends = std::mem::take(&mut mesh.offsets);
-    let shapes = std::mem::take(&mut mesh.shapes);
-    mesh.offsets.push(0);
-    let mut second = Vec::new();
-    for (c, shape) in shapes.into_iter().enumerate() {
-        let nodes = &old[ends[c] as usize..ends[c + 1] as usize];
-        if cells.binary_search(&(c as u32)).is_err() {
-            mesh.push_cell(shape, nodes);
-            continue;
-        }
-        let halves = halves(mesh, nodes);
-        mesh.push_cell(CellShape::Tri3, &halves[0]);
-        second.push(halves[1]);
+    let cut: Vec<u32> = (0..inside.len() as u32).filter(is_cut).collect();
+    match cut.iter().all(|&c| has_constant_jacobian(mesh, c as usize)) {
+        true => Vec::new(),
+        false => cut,
     }
-    let first = mesh.cell_count() as u32;
-    for nodes in second {
-        mesh.push_cell(CellShape::Tri3, &nodes);
-    }
-    for set in mesh.cell_sets.values_mut() {
-        let held = set.iter().filter_map(|c| cells.binary_search(c).ok());
-        let held: Vec<u32> = held.map(|k| first + k as u32).collect();
-        set.extend(held);
-    }
-}
-
-/// The two triangles of a quadrilateral whose smallest angle is the larger; where a corner points inwards, one of the other two would be negative.
-fn halves<const D: usize>(mesh: &Mesh<D>, corners: &[u32]) -> [[u32; 3]; 2] {
-    let at = |places: [usize; 3]| places.map(|i| corners[i]);
-    let pairs = [
-        [at([0, 1, 2]), at([0, 2, 3])],
-        [at([1, 2, 3]), at([1, 3, 0])],
-    ];
-    let least = |pair: &[[u32; 3]; 2]| {
-        let x = |triangle: &[u32; 3]| triangle.map(|n| mesh.nodes[n as usize]);
-        pair.iter()
-            .map(|triangle| smallest_angle(x(triangle)))
-            .fold(f64::INFINITY, f64::min)
-    };
-    match least(&pairs[0]) >= least(&pairs[1]) {
-        true => pairs[0],
-        false => pairs[1],
-    }
-}
-
-/// The smallest angle of a triangle, negative where its corners are clockwise.
-fn smallest_angle<const D: usize>(x: [Vector<D>; 3]) -> f64 {
-    let angle = |i: usize| {
-        let (a, b) = (x[(i + 1) % 3] - x[i], x[(i + 2) % 3] - x[i]);
-        (a[0] * b[1 % D] - b[0] * a[1 % D]).atan2(a.dot(&b))
-    };
-    angle(0).min(angle(1)).min(angle(2))
 }

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     mesh::{Mesh, boundary::BoundaryFacet, facet_corners},
-    model::simplex::{Simplex, facet_simplices},
+    model::simplex::{Simplex, around_middle, facet_simplices},
     tensor::Vector,
 };
 
@@ -33,8 +33,8 @@ pub(super) struct MetFacet<const D: usize> {
     pub cell: u32,
     /// Faces of the patch on it, with the size that they have in common.
     pub faces: Vec<(Face<D>, f64)>,
-    /// The rest of it.
-    pub left: PartMoments<D>,
+    /// The rest of it: one part, or as many as it has simplices where its cell is divided.
+    pub left: Vec<PartMoments<D>>,
     /// True if nothing is left of it.
     pub is_gone: bool,
 }
@@ -78,12 +78,23 @@ impl<const D: usize> PatchSurface<D> {
             true => normal * (-INWARDS * edge),
             false => Vector::zeros(),
         };
-        let mut left = PartMoments::about(mesh.nodes[facet.nodes[0] as usize]);
+        let is_divided = mesh.embedded.is_divided(facet.cell as usize);
+        let simplices = match (is_divided, facet_corners::<D>(&facet.nodes)) {
+            (true, corners @ [_, _, _, _]) => {
+                let x = corners.iter().map(|&n| mesh.nodes[n as usize]);
+                around_middle(&x.collect::<Vec<_>>())
+            }
+            (_, corners) => facet_simplices(mesh, corners),
+        };
+        let about = mesh.nodes[facet.nodes[0] as usize];
+        let mut left =
+            vec![PartMoments::about(about); if is_divided { simplices.len() } else { 1 }];
         let mut faces: BTreeMap<Face<D>, PartMoments<D>> = BTreeMap::new();
         let mut corners = facet_corners::<D>(&facet.nodes).to_vec();
         corners.sort_unstable();
         let (mut whole, mut is_met) = (0.0, false);
-        for simplex in facet_simplices(mesh, &facet.nodes) {
+        for (k, simplex) in simplices.iter().enumerate() {
+            let left = &mut left[if is_divided { k } else { 0 }];
             patch.cells.dice(
                 &simplex.shifted(&inwards),
                 &|_, _| true,
@@ -120,12 +131,13 @@ impl<const D: usize> PatchSurface<D> {
             let about = || PartMoments::about(patch.cells.centre(&face.cell));
             self.faces.entry(*face).or_insert_with(about).join(part);
         }
+        left.retain(|part| part.size > 0.0);
         let found = MetFacet {
             cell: facet.cell,
             faces: (faces.into_iter())
                 .map(|(face, part)| (face, part.size))
                 .collect(),
-            is_gone: left.size <= NOTHING * whole,
+            is_gone: left.iter().map(|part| part.size).sum::<f64>() <= NOTHING * whole,
             left,
         };
         self.met.insert(corners, found);
