@@ -7,7 +7,8 @@ use super::error::{SceneError, SceneErrorKind};
 use super::region::{self, Region};
 use super::source::Span;
 use super::spec::{
-    CouplingSpec, LatticeStart, RimSpec, SceneSpec, TransitionSpec, TruncatedSpec, ZonesNeeded,
+    CouplingSpec, LatticeStart, RimSpec, SceneSpec, SkinSpec, TransitionSpec, TruncatedSpec,
+    ZonesNeeded,
 };
 use super::unused::Parts;
 use super::validated::Scene;
@@ -128,7 +129,7 @@ fn with_rim<const D: usize>(
     refuse_others(draft.spec, &span)?;
     let truncated = CouplingSpec::Truncated(TruncatedSpec::default());
     let instead = draft.spec.coupling.is_none().then_some(&truncated);
-    let touched = placed.is_none().then(|| touched(draft)).flatten();
+    let touched = placed.is_none().then(|| met(draft)).flatten();
     let (before, _) = draft.with_coupling(placed.or(touched.as_ref()), instead)?;
     let conflict = |what: String, help: &str| {
         SceneError::new(SceneErrorKind::Conflict, what)
@@ -146,19 +147,38 @@ fn with_rim<const D: usize>(
         LatticeStart::OnCorner => origin,
         LatticeStart::Halfway => origin.add_scalar(-0.5 * spacing),
     };
+    let may_part =
+        before.breaking.breaks() || !draft.spec.cracks.is_empty() || !draft.spec.voids.is_empty();
+    let typed_skin = draft.spec.zones.skin;
     let lattice = PatchLattice {
         corner,
         spacing,
         per_cell: 1,
         within: around(draft, placed, &before),
         has_masses: matches!(draft.solve, Solve::Explicit(_)),
-        may_part: before.breaking.breaks()
-            || !draft.spec.cracks.is_empty()
-            || !draft.spec.voids.is_empty(),
+        // families lack points at surfaces, and elements carry all but what may fail
+        has_skin: typed_skin.map_or(!may_part, |skin| skin == SkinSpec::FreeSurfaces),
+        may_part,
         reach: reach(draft.spec, &before)
             .map_err(|what| conflict(what, "or use rim = \"mesh\""))?,
     };
-    let (patched, per_cell) = embedded(draft, placed, &before, lattice)
+    let found = match embedded(draft, placed, &before, lattice) {
+        // a zone that is nowhere thick enough
+        Err(_) if lattice.has_skin && typed_skin.is_none() => {
+            let has_skin = false;
+            embedded(
+                draft,
+                placed,
+                &before,
+                PatchLattice {
+                    has_skin,
+                    ..lattice
+                },
+            )
+        }
+        found => found,
+    };
+    let (patched, per_cell) = found
         .map_err(|error| conflict(format!("`zones.rim`: {error}"), "or use rim = \"mesh\""))?;
     for condition in &draft.conditions {
         if let Some(what) = conflict_with(condition, draft, &patched) {
@@ -168,17 +188,19 @@ fn with_rim<const D: usize>(
             ));
         }
     }
-    let choice = told(&patched, spacing * f64::from(per_cell), why);
+    let mut choices = vec![told(&patched, spacing * f64::from(per_cell), why)];
+    choices.extend(told_of_skin(patched.skin, typed_skin));
     let zone = Placed {
         nonlocal: patched.nonlocal,
         span: (draft.spec.zones.nonlocal.as_ref()).map_or(span, |zone| zone.span()),
+        is_for_patch: true,
     };
     let cell_material = (patched.origin.iter())
         .map(|&c| draft.cell_material[c as usize])
         .collect();
     let draft = draft.on_mesh(patched.mesh, cell_material, before.peridynamics)?;
     let (mut scene, _) = draft.with_coupling(Some(&zone), instead)?;
-    scene.choices.push(choice);
+    scene.choices.extend(choices);
     let (spec, unused) = (draft.spec, &scene);
     scene.unused = Parts {
         spec,
@@ -220,8 +242,24 @@ fn told<const D: usize>(patched: &Patched<D>, edge: f64, why: &str) -> Decision 
     }
 }
 
-/// A cell of the mesh that a zone meets which holds no centroid, where there is one: the zone may be smaller than the cells.
-fn touched<const D: usize>(draft: &Draft<'_, D>) -> Option<Placed> {
+/// Says how many cells of the lattice the surface of the body has made elements of, if any.
+fn told_of_skin(count: usize, typed: Option<SkinSpec>) -> Option<Decision> {
+    let why = match typed {
+        Some(_) => "the scene asks for a skin",
+        None => {
+            "nothing fails in this scene, and families lack points at a surface; zones.skin = \"none\" has points there"
+        }
+    };
+    (count > 0).then(|| Decision {
+        choice: format!(
+            "elements along the surface of the body in the place of {count} cells of points"
+        ),
+        why: why.to_owned(),
+    })
+}
+
+/// The cells of the mesh whose horizon and points those of the patch are, where they are not those that the zone holds in the mesh: all of them where a skin would take some, or one that the zone meets which holds no centroid.
+fn met<const D: usize>(draft: &Draft<'_, D>) -> Option<Placed> {
     let (mesh, zone) = (&draft.mesh, draft.spec.zones.nonlocal.as_ref()?);
     let region = region::region("zones.nonlocal", zone.get_ref(), mesh).ok()?;
     let meets = |c: usize| {
@@ -233,12 +271,20 @@ fn touched<const D: usize>(draft: &Draft<'_, D>) -> Option<Placed> {
             .map(|distance| distance <= radius.fold(0.0, f64::max))
     };
     let meets: Vec<bool> = (0..mesh.cell_count()).map(meets).collect::<Option<_>>()?;
-    // one of them, so that others stay local
-    let first = meets.iter().position(|meets| *meets);
-    let first = first.filter(|_| !region.select(mesh).contains(&true))?;
+    let held = region.select(mesh);
+    let nonlocal = match held.contains(&true) {
+        true if draft.spec.zones.skin.is_none() => return None,
+        true => held,
+        // one of them, so that others stay local
+        false => {
+            let first = meets.iter().position(|meets| *meets)?;
+            (0..meets.len()).map(|c| c == first).collect()
+        }
+    };
     Some(Placed {
-        nonlocal: (0..meets.len()).map(|c| c == first).collect(),
+        nonlocal,
         span: zone.span(),
+        is_for_patch: true,
     })
 }
 
@@ -250,7 +296,6 @@ fn refuse_others(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
         ("output.sections", !spec.output.sections.is_empty()),
         ("impactors", !spec.impactors.is_empty()),
         ("zones.follow", zones.follow.is_some()),
-        ("zones.skin", zones.skin.is_some()),
         ("zones.bodies", !zones.bodies.is_empty()),
     ];
     match others.iter().find(|other| other.1) {

@@ -19,6 +19,8 @@ pub(crate) struct Placed {
     pub nonlocal: Vec<bool>,
     /// Span at which the scene asks for it.
     pub span: Span,
+    /// True if a patch lays the skin, and not the cells of the mesh.
+    pub is_for_patch: bool,
 }
 
 /// The region of the nonlocal zone: placed, or drawn in the scene.
@@ -153,7 +155,8 @@ pub(crate) fn zones<const D: usize>(
         .iter()
         .map(|n| if *n { Zone::Nonlocal } else { Zone::Local })
         .collect();
-    if let Some(SkinSpec::FreeSurfaces) = spec.zones.skin {
+    let is_of_patch = placed.is_some_and(|p| p.is_for_patch);
+    if spec.zones.skin == Some(SkinSpec::FreeSurfaces) && !is_of_patch {
         for (zone, outer) in zones.iter_mut().zip(mesh.cells_at_boundary()) {
             if outer {
                 *zone = Zone::Local;

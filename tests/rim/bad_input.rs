@@ -44,10 +44,6 @@ fn the_plate_itself_runs() {
 fn keys_that_do_not_go_together() {
     let rim = "`zones.rim = \"own\"`";
     refused(
-        &plate().set("zones.skin", "free-surfaces"),
-        &[rim, "`zones.skin`"],
-    );
-    refused(
         &plate()
             .set("peridynamics.points", "cells")
             .horizon(8.0)

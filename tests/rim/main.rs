@@ -10,6 +10,7 @@ mod hexahedra;
 mod meshes;
 mod quadrilaterals;
 mod shown;
+mod skin;
 mod structure;
 mod surfaces;
 
@@ -82,5 +83,7 @@ fn scene_of_spacing<const D: usize>(
         .spacing(spacing)
         .set("peridynamics.points.lattice.origin", origin)
         .set("zones.rim", "own")
+        // what a surface does to points is what these ask
+        .set("zones.skin", "none")
         .set("solver.tolerance", 1e-14)
 }

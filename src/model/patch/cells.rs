@@ -34,6 +34,8 @@ pub(super) struct PatchCells<const D: usize> {
     pub all: BTreeSet<Index<D>>,
     /// The cells of the mesh that have a part in each cell of the lattice in and around the patch, with its volume.
     pub held: BTreeMap<Index<D>, Vec<(u32, f64)>>,
+    /// Cells that were wanted and are not of the zone, since the surface of the body is near.
+    pub skin: usize,
     /// Corners of the box of cells of which [`PatchCells::held`] is known.
     limits: (Index<D>, Index<D>),
     /// True as long as no cell beyond was asked for.
@@ -74,11 +76,11 @@ impl<const D: usize> Face<D> {
 }
 
 impl<const D: usize> PatchCells<D> {
-    /// The cells whose centre is wanted and lies between two corners, and a rim of so many cells around them.
+    /// The cells whose centre is wanted and lies between two corners, and a rim of so many cells around them; with a skin those alone whose rim is whole.
     pub fn new(
         mesh: &Mesh<D>,
         cells: Cells<D>,
-        width: i32,
+        (width, has_skin): (i32, bool),
         (low, high): (Vector<D>, Vector<D>),
         is_wanted: &(dyn Fn(&Vector<D>) -> bool + Sync),
     ) -> Result<Self, PatchError> {
@@ -121,12 +123,22 @@ impl<const D: usize> PatchCells<D> {
             zone: BTreeSet::new(),
             all: BTreeSet::new(),
             held,
+            skin: 0,
             limits,
             is_known: true,
         };
         patch.zone = (wanted.into_iter())
             .filter(|index| patch.is_material(index))
             .collect();
+        if has_skin {
+            let around =
+                |index: &Index<D>| block(index.map(|i| i - width), index.map(|i| i + width));
+            let is_whole = |index: &Index<D>| around(index).all(|other| !patch.is_cut(&other));
+            let all = patch.zone.len();
+            let inner = patch.zone.iter().filter(|index| is_whole(index));
+            patch.zone = inner.copied().collect();
+            patch.skin = all - patch.zone.len();
+        }
         if patch.zone.is_empty() {
             return Err(empty);
         }

@@ -42,6 +42,8 @@ pub struct Patched<const D: usize> {
     pub torn: FxHashSet<String>,
     /// Cells of the rim.
     pub rim: usize,
+    /// Cells of the lattice in the zone that are elements, since the surface of the body is near.
+    pub skin: usize,
     /// Cells that were replaced before the patch cut them.
     pub replaced: Replaced,
 }
@@ -123,6 +125,7 @@ impl<'s, const D: usize> Composite<'s, D> {
         let mut composite = Self {
             patched: Patched {
                 rim: patch.all.len() - patch.zone.len(),
+                skin: 0,
                 replaced: Replaced::default(),
                 mesh,
                 nonlocal,

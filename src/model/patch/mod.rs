@@ -59,6 +59,8 @@ pub struct PatchLattice<const D: usize> {
     pub within: (Vector<D>, Vector<D>),
     /// True if the body moves: every node then needs a mass.
     pub has_masses: bool,
+    /// True if elements are to lie between the surface of the body and the zone.
+    pub has_skin: bool,
     /// True if cracks may part the zone: no element may then reach from one side of it to another.
     pub may_part: bool,
 }
@@ -91,7 +93,13 @@ pub fn embed<const D: usize>(
 ) -> Result<Patched<D>, PatchError> {
     let cells = lattice.cells(&mesh.bounds().0);
     let width = 1 + (lattice.reach / cells.spacing - 1e-6).ceil() as i32;
-    let mut patch = PatchCells::new(mesh, cells, width, lattice.within, is_wanted)?;
+    let mut patch = PatchCells::new(
+        mesh,
+        cells,
+        (width, lattice.has_skin),
+        lattice.within,
+        is_wanted,
+    )?;
     for _ in 0..ABSORBED {
         patch.check_materials(material)?;
         patch.check_connected(mesh)?;
@@ -148,6 +156,7 @@ fn embedded<const D: usize>(
         });
     }
     Ok(Patched {
+        skin: patch.skin,
         replaced,
         ..patched
     })

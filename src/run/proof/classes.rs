@@ -101,8 +101,6 @@ pub(super) enum Skin {
     Possible,
     /// A crack or void passes through the cells there, and elements carry neither.
     Crossed,
-    /// The zone has a rim of its own, beside which there is no `zones.skin`.
-    Rim,
     /// There are no elements at all, so that zones are not looked at.
     NoElements,
 }
@@ -117,9 +115,6 @@ impl Skin {
             Self::Crossed => {
                 "a crack or void passes through the cells there, which elements cannot carry; a smaller horizon makes the layer thinner"
             }
-            Self::Rim => {
-                "end the zone two horizons below the surface where no crack comes, or take a smaller horizon"
-            }
             Self::NoElements => {
                 "elements there (coupling = \"truncated\" and zones.skin = \"free-surfaces\") or a smaller horizon help"
             }
@@ -129,7 +124,6 @@ impl Skin {
     /// As [`Skin::remedy`], where a seam meets the surface.
     fn remedy_at_seam(self) -> &'static str {
         match self {
-            Self::Rim => self.remedy(),
             Self::Possible | Self::NoElements => {
                 "zones.skin = \"free-surfaces\", or end the zones two horizons from the surface"
             }

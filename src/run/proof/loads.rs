@@ -45,8 +45,9 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
         findings: Vec::new(),
     };
     let (mut worst, masses) = mass(model, &subject.rest.density, &mut part);
-    // in equilibrium masses play no part: a load on a row does, whose scale is that of its part of the body
+    // in equilibrium masses play no part; a load on a row that is no derivative of an energy does, whose scale is that of its part of the body
     let moves = subject.system.is_some();
+    let has_energy = subject.coupling.symmetry() == Symmetry::Symmetric;
     let mut is_needed = vec![moves; masses.len()];
     let loads = Loads::new(model, conditions, BodyForces::Consistent)?;
     let mut count = 0;
@@ -64,7 +65,7 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
             own.add(&f, &(site.position - centre));
         }
         for (needed, f) in is_needed.iter_mut().zip(load.chunks_exact(D)) {
-            *needed |= f.iter().any(|&f| f != 0.0);
+            *needed |= !has_energy && f.iter().any(|&f| f != 0.0);
         }
         let domain = (on, c.components.depends_on_position());
         let exact = at_once.visit(0.0, |field| exact(model, domain, field));

@@ -42,12 +42,8 @@ pub(super) fn skin<const D: usize>(model: &Model<D>) -> Skin {
     }
     let barriers = model.peridynamics.iter().flat_map(|p| &p.barriers);
     let barriers: Vec<_> = barriers.collect();
-    let without = match mesh.embedded.has_patch() {
-        true => Skin::Rim,
-        false => Skin::Possible,
-    };
     if barriers.is_empty() {
-        return without;
+        return Skin::Possible;
     }
     let at_surface = mesh.cells_at_boundary();
     // a crack along the face of a cell passes through it, too
@@ -59,7 +55,7 @@ pub(super) fn skin<const D: usize>(model: &Model<D>) -> Skin {
     };
     match { cells }.any(is_crossed) {
         true => Skin::Crossed,
-        false => without,
+        false => Skin::Possible,
     }
 }
 

@@ -199,6 +199,7 @@ impl<const D: usize> Search<'_, D> {
         let mut placed = Placed {
             nonlocal: self.zone(&criteria),
             span: self.span.clone(),
+            is_for_patch: false,
         };
         let mut round = 1;
         loop {
@@ -268,7 +269,11 @@ impl<const D: usize> Search<'_, D> {
         };
         let span = self.span.clone();
         Found {
-            zone: Placed { nonlocal, span },
+            zone: Placed {
+                nonlocal,
+                span,
+                is_for_patch: false,
+            },
             placement,
             kept,
         }

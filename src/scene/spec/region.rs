@@ -90,8 +90,10 @@ pub struct BodySpec {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SkinSpec {
-    /// One cell thick on the boundary of the mesh; meant for the coupling `truncated`.
+    /// Elements on the boundary of the mesh: one cell thick, or as thick as a rim of its own is; meant for the coupling `truncated`.
     FreeSurfaces,
+    /// No such layer.
+    None,
 }
 
 /// Cells along which the seam runs.
