@@ -149,7 +149,7 @@ fn prove<const D: usize>(
         apply(number, &u, &mut force);
         nodal_forces(model, &integrals, &site_of_node, g, &mut wanted);
         parallel::for_each_mut(&mut worst, 1, |s, worst| {
-            let v = model.sites[s].volume;
+            let v = volume_of_row(model, s);
             let h = v.powf(1.0 / D as f64);
             let difference = (s * D..(s + 1) * D).map(|k| (force[k] - wanted[k]).abs());
             let density = difference.fold(0.0, f64::max) / (v / h * scale);
@@ -193,6 +193,19 @@ fn prove<const D: usize>(
             },
         },
     )
+}
+
+/// Part of the largest cell of a site that its row stands for at least.
+const LEAST: f64 = 0.01;
+
+/// Returns the volume over which the force of a row is taken \[m^D\]: that of its site, and not what little, or less than nothing, cuts and nodes that follow leave it of cells whose round-off the row has.
+fn volume_of_row<const D: usize>(model: &Model<D>, site: usize) -> f64 {
+    let own = model.sites[site].volume;
+    if !model.mesh.embedded.has_patch() || model.point_of(site).is_some() {
+        return own;
+    }
+    let cells = model.cells_of_site(site).map(|(c, _)| model.mesh.cell_volume(c).abs());
+    cells.map(|volume| LEAST * volume).fold(own, f64::max)
 }
 
 fn is_point<const D: usize>(site: &Site<D>) -> bool {
