@@ -1,6 +1,7 @@
 //! The check that elements can live on the cells of a body.
 
-use super::element::{jacobian, reference, relative_nodes};
+use super::element::reference;
+use super::geometry::{jacobian, relative_nodes};
 use crate::mesh::{CellShape, Mesh};
 use crate::parallel;
 use crate::tensor::determinant;

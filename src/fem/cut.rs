@@ -1,6 +1,7 @@
 //! Quadrature rules of a part of a cell, from the moments of the part.
 
-use super::element::{jacobian, reference, relative_nodes};
+use super::element::reference;
+use super::geometry::{jacobian, relative_nodes};
 use super::locate::reference_of;
 use crate::mesh::{CellShape, CutCell, Mesh};
 use crate::tensor::{Tensor, Vector, determinant, padded};

@@ -10,8 +10,7 @@
 //! a cell of bilinear or trilinear functions therefore keeps affine fields in equilibrium.
 
 use super::cell::{PerNode, ReferenceCell};
-use super::element::{jacobian, relative_nodes};
-use super::load::normal;
+use super::geometry::{jacobian, normal, relative_nodes};
 use super::{hex8, quad4};
 use crate::mesh::{CellShape, Mesh};
 use crate::tensor::{Vector, determinant, inverse};

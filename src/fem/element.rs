@@ -1,6 +1,7 @@
 //! Quadrature points in space, block rows of an element's stiffness, and fields inside of a cell.
 
 use super::cell::{MAX_NODES, PerNode, ReferenceCell, Rule};
+use super::geometry::{jacobian, relative_nodes};
 use super::{divided, reference_cell};
 use crate::mesh::Mesh;
 use crate::tensor::{Tensor, Tensor4, Vector, inverse, padded};
@@ -35,33 +36,6 @@ pub(super) fn reference<const D: usize>(
         true => divided::of(shape),
     };
     cell.filter(|cell| cell.shape.dimension() == D)
-}
-
-/// Positions of the nodes relative to the first, which keeps digits of small cells far from the origin.
-pub(super) fn relative_nodes<const D: usize>(
-    mesh: &Mesh<D>,
-    c: usize,
-) -> (Vector<D>, PerNode<Vector<D>>) {
-    let nodes = mesh.cell(c);
-    let origin = mesh.nodes[nodes[0] as usize];
-    let mut x = [Vector::zeros(); MAX_NODES];
-    for (x, &n) in x.iter_mut().zip(nodes) {
-        *x = mesh.nodes[n as usize] - origin;
-    }
-    (origin, x)
-}
-
-/// `J_ij = ∂x_i/∂ξ_j` from the positions of a cell's nodes and reference gradients.
-pub(super) fn jacobian<const D: usize>(x: &[Vector<D>], gradients: &[[f64; 3]]) -> Tensor<D> {
-    let mut j = Tensor::zeros();
-    for (x, g) in x.iter().zip(gradients) {
-        for k in 0..D {
-            for i in 0..D {
-                j[(i, k)] += x[i] * g[k];
-            }
-        }
-    }
-    j
 }
 
 /// The point of a cell at reference coordinates `xi` with quadrature weight `w`.

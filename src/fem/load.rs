@@ -3,6 +3,7 @@
 use super::cell::{ReferenceCell, Rule, RulePoint};
 use super::divided;
 use super::element::{for_each_point, shape_values};
+use super::geometry::normal;
 use super::locate::reference_of;
 use super::{line2, line3, quad4, quad8, tri3, tri6};
 use crate::mesh::boundary::BoundaryFacet;
@@ -155,19 +156,6 @@ fn facet_point<const D: usize>(
         shape,
         normal: normal(&p, &q),
     }
-}
-
-/// The unit normal of a facet with these tangents: on the right of `p` in 2D, along `p × q` in 3D.
-pub(super) fn normal<const D: usize>(p: &Vector<D>, q: &Vector<D>) -> Vector<D> {
-    let normal: Vector<D> = match D {
-        2 => Vector::from_fn(|k, _| if k == 0 { p[1] } else { -p[0] }),
-        3 => Vector::from_fn(|k, _| {
-            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-            p[i] * q[j] - p[j] * q[i]
-        }),
-        _ => Vector::zeros(),
-    };
-    normal.try_normalize(0.0).unwrap_or_else(Vector::zeros)
 }
 
 /// Visits the quadrature points of a facet with its outward unit normal there, in 1D too.

@@ -2,7 +2,8 @@
 
 use super::cell::PerNode;
 use super::divided;
-use super::element::{jacobian, reference, relative_nodes};
+use super::element::reference;
+use super::geometry::{jacobian, relative_nodes};
 use crate::mesh::Mesh;
 use crate::tensor::{Vector, inverse, padded};
 

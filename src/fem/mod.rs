@@ -37,6 +37,7 @@
 //! | `cell.rs` | description of a reference cell |
 //! | `line2.rs`, `tri3.rs`, `quad4.rs`, `tet4.rs`, `hex8.rs` | one linear cell each |
 //! | `line3.rs`, `tri6.rs`, `quad8.rs`, `tet10.rs`, `hex20.rs` | one cell of second order each |
+//! | `geometry.rs` | places of nodes, Jacobians, normals of facets |
 //! | `element.rs` | quadrature points in space, block rows of an element's stiffness, fields at a point |
 //! | `superconvergent.rs` | the displacement gradient anywhere in a cell, from where it is most accurate |
 //! | `cut.rs` | quadrature rules of a part of a cell |
@@ -56,6 +57,7 @@ mod crack_band;
 mod cut;
 mod divided;
 mod element;
+mod geometry;
 mod hex20;
 mod hex8;
 mod line2;

@@ -395,8 +395,11 @@ pub(crate) fn load_steps<const D: usize>(
         prediction.warnings =
             warnings(laid_out.model, laid_out.rest, laid_out.traits, &prediction)?;
         prediction.warnings.push(format!(
-            "the time of {} load steps is not in the estimate: it depends on the bonds that break",
-            spec.steps
+            "the time of {} is not in the estimate: it depends on the bonds that break",
+            match spec.accuracy {
+                None => format!("{} load steps", spec.steps),
+                Some(_) => "the load steps, and their number,".to_owned(),
+            }
         ));
         if laid_out.rest.breaking.damages {
             // small runs may take minutes where cracks open

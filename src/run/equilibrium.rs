@@ -18,7 +18,7 @@ use crate::solve::FreeDofs;
 use crate::solve::explicit::Drive;
 use crate::solve::krylov::LinearMap;
 use crate::solve::quasi_static::{
-    self, Aids, LoadState, QuasiStaticError, QuasiStaticParams, Refactor, TangentFactors,
+    self, Aids, LoadState, Pacing, QuasiStaticError, QuasiStaticParams, Refactor, TangentFactors,
 };
 use crate::solve::statics::{
     self, Method, MethodUsed, SpreadProblem, SpreadRows, StaticError, StaticInfo, StaticParams,
@@ -376,7 +376,7 @@ fn nonlinear<const D: usize>(
             near: near.or(multigrid.as_ref().map(|made| made as &dyn LinearMap)),
             progress,
         },
-        &|step| (step == 0).then_some(0.0),
+        Pacing::Listed(&|step| (step == 0).then_some(0.0)),
         &mut state,
         &mut |seen| {
             internal = seen.force.to_vec();

@@ -162,22 +162,7 @@ fn with_rim<const D: usize>(
         reach: reach(draft.spec, &before)
             .map_err(|what| conflict(what, "or use rim = \"mesh\""))?,
     };
-    let found = match embedded(draft, placed, &before, lattice) {
-        // a zone that is nowhere thick enough
-        Err(_) if lattice.has_skin && typed_skin.is_none() => {
-            let has_skin = false;
-            embedded(
-                draft,
-                placed,
-                &before,
-                PatchLattice {
-                    has_skin,
-                    ..lattice
-                },
-            )
-        }
-        found => found,
-    };
+    let found = embedded_with_skin(draft, placed, &before, lattice);
     let (patched, per_cell) = found
         .map_err(|error| conflict(format!("`zones.rim`: {error}"), "or use rim = \"mesh\""))?;
     for condition in &draft.conditions {
@@ -366,6 +351,24 @@ fn around<const D: usize>(
     let cells = (0..mesh.cell_count()).filter(|&c| may_meet(c));
     let nodes: Vec<u32> = cells.flat_map(|c| mesh.corners(c)).copied().collect();
     mesh.bounds_of(&nodes)
+}
+
+/// As [`embedded`], without a skin that the scene does not ask for where the zone is nowhere thick enough for one.
+fn embedded_with_skin<const D: usize>(
+    draft: &Draft<'_, D>,
+    placed: Option<&Placed>,
+    before: &Scene<D>,
+    lattice: PatchLattice<D>,
+) -> Result<(Patched<D>, u32), PatchError> {
+    let found = embedded(draft, placed, before, lattice);
+    if found.is_ok() || !lattice.has_skin || draft.spec.zones.skin.is_some() {
+        return found;
+    }
+    let without = PatchLattice {
+        has_skin: false,
+        ..lattice
+    };
+    embedded(draft, placed, before, without)
 }
 
 /// The mesh with the patch, and how many spacings its cells have along their edges.

@@ -55,8 +55,10 @@ pub struct Explicit {
 /// States of equilibrium under a load that grows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct QuasiStatic {
-    /// Number of load steps.
+    /// Number of load steps; of adaptive ones that of the intervals by which prescribed velocities are integrated.
     pub steps: usize,
+    /// Accuracy of the load at which something fails, where steps are adaptive.
+    pub accuracy: Option<f64>,
     /// The time of each; empty where they are of equal length.
     pub times: Vec<f64>,
     /// Value of t at the last step.
@@ -71,7 +73,7 @@ pub struct QuasiStatic {
     pub largest_rotation: Option<f64>,
     /// Treatment of a body that has parted.
     pub when_parted: WhenPartedSpec,
-    /// Load steps between VTU files.
+    /// Load steps between VTU files; of adaptive ones the part of the duration.
     pub output_every: usize,
     /// Interval at which a checkpoint is written.
     pub checkpoint_every: Option<Pace>,
@@ -347,6 +349,35 @@ fn listed(spec: &QuasiStaticSpec, times: &[f64]) -> Result<Vec<f64>, SceneError>
     Ok(times.to_vec())
 }
 
+/// Intervals of a load that adaptive steps divide.
+const FINEST: usize = 1000;
+
+/// Accuracy of the load of adaptive steps.
+const ACCURACY: f64 = 0.01;
+
+/// The accuracy of the load of adaptive steps; none of others.
+fn accuracy(spec: &QuasiStaticSpec) -> Result<Option<f64>, SceneError> {
+    let place = "solve.quasi-static.accuracy";
+    let is_auto = spec.steps.choice == StepTimes::Auto;
+    match &spec.accuracy {
+        None => Ok(is_auto.then_some(ACCURACY)),
+        Some(a) if is_auto => bounds_checks::within(
+            place,
+            a,
+            (1e-5..=0.2).contains(&a.value),
+            "must lie between 1e-5 and 0.2",
+            "0.01 finds the load at which bonds break to 1 %",
+        )
+        .map(Some),
+        Some(a) => Err(SceneError::new(
+            SceneErrorKind::Conflict,
+            format!("`{place}` is set and the load steps are given"),
+        )
+        .label(a.span.clone(), "of steps that are found on the way")
+        .help("use steps = \"auto\", or leave accuracy out")),
+    }
+}
+
 fn quasi_static(spec: &QuasiStaticSpec) -> Result<QuasiStatic, SceneError> {
     let place = |key: &str| format!("solve.quasi-static.{key}");
     let count = |key: &str, number: &Count| {
@@ -371,7 +402,9 @@ fn quasi_static(spec: &QuasiStaticSpec) -> Result<QuasiStatic, SceneError> {
             let listed = listed(spec, times)?;
             (listed.len(), listed)
         }
+        StepTimes::Auto => (FINEST, Vec::new()),
     };
+    let accuracy = accuracy(spec)?;
     let duration = match &spec.duration {
         Some(d) => bounds_checks::positive(&place("duration"), d)?,
         None => times.last().copied().unwrap_or(1.0),
@@ -392,6 +425,7 @@ fn quasi_static(spec: &QuasiStaticSpec) -> Result<QuasiStatic, SceneError> {
     };
     Ok(QuasiStatic {
         steps,
+        accuracy,
         times,
         duration,
         method: spec.method,

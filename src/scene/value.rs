@@ -48,7 +48,7 @@ pub struct Every {
     pub span: Span,
 }
 
-/// A number of load steps, or the times of all of them.
+/// A number of load steps, the times of all of them, or "auto".
 #[derive(Clone, Debug)]
 pub struct Steps {
     /// The value as typed.
@@ -57,23 +57,15 @@ pub struct Steps {
     pub span: Span,
 }
 
-impl Steps {
-    /// Returns the number of load steps.
-    pub fn count(&self) -> usize {
-        match &self.choice {
-            StepTimes::Equal(number) => *number,
-            StepTimes::Listed(times) => times.len(),
-        }
-    }
-}
-
-/// Load steps of equal length, or at the times that are listed.
+/// Load steps of equal length, at the times that are listed, or found on the way.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StepTimes {
     /// So many of equal length.
     Equal(usize),
     /// At these times.
     Listed(Vec<f64>),
+    /// As long as nothing fails in them.
+    Auto,
 }
 
 /// A piece of text: a path, the name of a set, or a key that the user chose.
@@ -288,10 +280,10 @@ impl<'de> Deserialize<'de> for StepTimes {
         struct Choices;
         let count = |e: &Expression| StepTimes::Equal(e.eval(&[0.0; 3]) as usize);
         impl<'de> Visitor<'de> for Choices {
-            type Value = Result<Expression, Vec<f64>>;
+            type Value = Result<Expression, StepTimes>;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a whole number, or a list of times such as [0.5, 0.8, 1]")
+                f.write_str("a whole number, \"auto\", or a list of times such as [0.5, 0.8, 1]")
             }
 
             fn visit_i64<E: de::Error>(self, v: i64) -> Result<Self::Value, E> {
@@ -303,16 +295,21 @@ impl<'de> Deserialize<'de> for StepTimes {
             }
 
             fn visit_str<E: de::Error>(self, v: &str) -> Result<Self::Value, E> {
-                Scalars::Whole.visit_str(v).map(Ok)
+                match v {
+                    "auto" => Ok(Err(StepTimes::Auto)),
+                    v => Scalars::Whole.visit_str(v).map(Ok),
+                }
             }
 
             fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
-                Lists.visit_seq(seq).map(Err)
+                Lists
+                    .visit_seq(seq)
+                    .map(|times| Err(StepTimes::Listed(times)))
             }
         }
         Ok(match deserializer.deserialize_any(Choices)? {
             Ok(number) => count(&number),
-            Err(times) => Self::Listed(times),
+            Err(other) => other,
         })
     }
 }
@@ -464,7 +461,7 @@ schema!(Count, "Count", {
     "minimum": 0
 });
 schema!(Steps, "Steps", {
-    "description": "A number of load steps of equal length, or the list of their times.",
+    "description": "A number of load steps of equal length, the list of their times, or \"auto\".",
     "type": ["integer", "string", "array"],
     "items": { "type": ["number", "string"] }
 });

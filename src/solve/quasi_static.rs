@@ -20,47 +20,31 @@
 use std::ops::ControlFlow;
 
 use lead::Lead;
+use pacing::Limits;
 use residual::{MOVED, Run, Tangent};
 
 use crate::{
     solve::{FreeDofs, explicit::Drive},
-    system::{FailureUpdate, Halfway, Interval, SemiDiscrete},
+    system::{Dissipation, FailureUpdate, Halfway, Interval, SemiDiscrete},
 };
 
 mod consistent;
 mod error;
 mod factors;
 mod lead;
+mod load_state;
 mod newton;
+mod pacing;
 mod params;
 mod relaxation;
 mod residual;
 
 pub use error::QuasiStaticError;
 pub use factors::TangentFactors;
+pub use load_state::LoadState;
+pub use pacing::{Adaptive, Pacing};
 pub use params::{Aids, Equilibrium, QuasiStaticParams, Refactor};
 pub use residual::TIGHTEST;
-
-/// All that a run carries from load step to load step, but for the damage, which the system keeps.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct LoadState {
-    /// Load steps done.
-    pub step: u64,
-    /// Displacement \[m\], one entry per dof.
-    pub u: Vec<f64>,
-    /// Bonds broken since the start.
-    pub broken: u64,
-}
-
-impl LoadState {
-    /// The start, undeformed.
-    pub fn at_rest(dofs: usize) -> LoadState {
-        LoadState {
-            u: vec![0.0; dofs],
-            ..LoadState::default()
-        }
-    }
-}
 
 /// A load step that is done, as the observer sees it.
 #[derive(Clone, Copy)]
@@ -79,7 +63,7 @@ pub struct LoadStep<'a> {
     pub broken: u64,
     /// Rounds in which bonds broke.
     pub rounds: usize,
-    /// Products with the stiffness, or passes over the bonds.
+    /// Products with the stiffness, or passes over the bonds, those of longer steps that were given up included.
     pub iterations: usize,
     /// Factorisations of the tangent.
     pub factorisations: usize,
@@ -155,7 +139,49 @@ fn check_shapes(
     Ok(())
 }
 
-/// Runs load steps, those that `state` has done left out; `times` is the time of each by its number, none beyond the last. After each, `observe` may stop.
+impl<'a> Run<'a> {
+    /// Work space at a state.
+    ///
+    /// # Errors
+    /// Those of [`check_shapes`].
+    fn new(
+        system: &'a mut dyn SemiDiscrete,
+        prescribed: &[u32],
+        params: QuasiStaticParams,
+        aids: Aids<'a>,
+        state: &LoadState,
+    ) -> Result<Self, QuasiStaticError> {
+        let block = system.block().max(1);
+        let dofs = system.mass().len() * block;
+        check_shapes(prescribed, state, dofs)?;
+        let mut held = vec![None; dofs];
+        prescribed
+            .iter()
+            .for_each(|&k| held[k as usize] = Some(0.0));
+        Ok(Self {
+            inverse: vec![0.0; dofs],
+            system,
+            aids,
+            params,
+            free: FreeDofs::from_prescribed(&held, block),
+            load: vec![0.0; dofs],
+            force: vec![0.0; dofs],
+            residual: vec![0.0; dofs],
+            balanced: 0.0,
+            step: state.step,
+            time: 0.0,
+            interval: Interval::AT_ONCE,
+            tangent: Tangent::AtRest,
+            is_whole: false,
+            lead: Lead::default(),
+            residuals: Vec::new(),
+            is_torn: false,
+            is_between: false,
+        })
+    }
+}
+
+/// Runs load steps, those that `state` has done left out. After each, `observe` may stop.
 ///
 /// # Errors
 /// [`QuasiStaticError`], each with load step, time, place and remedy. After [`QuasiStaticError::Interrupted`] `state` and the damage of the system lie within a load step:
@@ -165,56 +191,48 @@ pub fn run(
     drive: &dyn Drive,
     params: QuasiStaticParams,
     aids: Aids<'_>,
-    times: &dyn Fn(u64) -> Option<f64>,
+    pacing: Pacing<'_>,
     state: &mut LoadState,
     observe: &mut dyn FnMut(&LoadStep<'_>) -> ControlFlow<()>,
 ) -> Result<QuasiStaticInfo, QuasiStaticError> {
-    let block = system.block().max(1);
-    let dofs = system.mass().len() * block;
-    let prescribed = drive.prescribed().to_vec();
-    check_shapes(&prescribed, state, dofs)?;
-    let mut held = vec![None; dofs];
-    prescribed
-        .iter()
-        .for_each(|&k| held[k as usize] = Some(0.0));
-    let mut work = Run {
-        inverse: vec![0.0; dofs],
-        system,
-        aids,
-        params,
-        free: FreeDofs::from_prescribed(&held, block),
-        load: vec![0.0; dofs],
-        force: vec![0.0; dofs],
-        residual: vec![0.0; dofs],
-        balanced: 0.0,
-        step: state.step,
-        time: 0.0,
-        interval: Interval::AT_ONCE,
-        tangent: Tangent::AtRest,
-        is_whole: false,
-        lead: Lead::default(),
-        residuals: Vec::new(),
-        is_torn: false,
-        is_between: false,
-    };
-    let mut values = vec![0.0; prescribed.len()];
+    let mut work = Run::new(system, drive.prescribed(), params, aids, state)?;
+    let mut values = vec![0.0; drive.prescribed().len()];
     let mut info = QuasiStaticInfo::default();
-    while let Some(time) = times(state.step) {
+    let mut given_up = 0;
+    while let Some(next) = pacing.next(state) {
+        let time = next.time;
         work.step = state.step;
         work.is_torn = state.broken > 0;
-        let before = state.step.checked_sub(1).and_then(times);
-        let mut account = work.apply_load(drive, before, time, &mut values, &state.u)?;
-        let predicted = work.set_out(&mut state.u, &prescribed, &values)?;
+        let kept = (next.limits).map(|limits| Kept::of(&*work.system, state, limits));
+        let before = (state.step > 0).then_some(state.time);
+        let done = work.advance(drive, (before, time), &mut values, state, kept.as_ref());
+        let (account, settled) = match (done, kept) {
+            (Ok((account, settled)), _) if !settled.gave_up => (account, settled),
+            (Err(error @ QuasiStaticError::Interrupted { .. }), _) => return Err(error),
+            (done, Some(kept)) if kept.limits.may_give_up => {
+                given_up += done.map_or(0, |(_, settled)| settled.iterations);
+                kept.restore(work.system, state);
+                pacing.cut(state, time);
+                work.is_between = false;
+                continue;
+            }
+            (done, _) => done?,
+        };
         let Settled {
             broken,
             rounds,
             iterations,
             residual,
-        } = work.settle(&mut state.u, predicted, account.as_mut())?;
+            fails,
+            ..
+        } = settled;
+        let iterations = iterations + std::mem::take(&mut given_up);
         work.system.commit();
         let heat = work.system.take_heat_work();
         state.step += 1;
         state.broken += broken;
+        let start = std::mem::replace(&mut state.time, time);
+        pacing.go_on(state, start, fails);
         info.steps += 1;
         info.broken += broken;
         info.iterations += iterations;
@@ -246,9 +264,62 @@ struct Settled {
     rounds: usize,
     iterations: usize,
     residual: f64,
+    /// True if the step is to be taken again, shorter.
+    gave_up: bool,
+    /// True if more has failed than may in a long step.
+    fails: bool,
+}
+
+/// The state before a load step that may be too long, as far as a trial changes it.
+struct Kept {
+    damage: Vec<u64>,
+    dissipation: Option<Dissipation>,
+    u: Vec<f64>,
+    limits: Limits,
+}
+
+impl Kept {
+    fn of(system: &dyn SemiDiscrete, state: &LoadState, limits: Limits) -> Self {
+        Self {
+            damage: system.damage_state(),
+            dissipation: system.dissipation(),
+            u: state.u.clone(),
+            limits,
+        }
+    }
+
+    /// Returns true if more is spent at the displacement `u` than may be.
+    fn is_passed(&self, system: &dyn SemiDiscrete, u: &[f64]) -> bool {
+        let energy = |d: &Option<Dissipation>| d.as_ref().map_or(0.0, |d| d.energy);
+        let spent = energy(&system.dissipation()) - energy(&self.dissipation);
+        spent > self.limits.most_spent * system.stored_energy(u)
+    }
+
+    fn restore(self, system: &mut dyn SemiDiscrete, state: &mut LoadState) {
+        system.restore_damage(&self.damage);
+        if let Some(dissipation) = self.dissipation {
+            system.set_dissipation(dissipation);
+        }
+        state.u = self.u;
+    }
 }
 
 impl Run<'_> {
+    /// Takes one load step, up to where more fails than may; the work on the way, and what came of it.
+    fn advance(
+        &mut self,
+        drive: &dyn Drive,
+        (before, time): (Option<f64>, f64),
+        values: &mut [f64],
+        state: &mut LoadState,
+        kept: Option<&Kept>,
+    ) -> Result<(Option<Balance>, Settled), QuasiStaticError> {
+        let mut account = self.apply_load(drive, before, time, values, &state.u)?;
+        let predicted = self.set_out(&mut state.u, drive.prescribed(), values)?;
+        let settled = self.settle(&mut state.u, predicted, account.as_mut(), kept)?;
+        Ok((account, settled))
+    }
+
     /// Takes the loads and the prescribed displacements of a load step, from the time `before` it; the work so far, of all but the first.
     fn apply_load(
         &mut self,
@@ -292,8 +363,10 @@ impl Run<'_> {
         u: &mut [f64],
         mut iterations: usize,
         mut account: Option<&mut Balance>,
+        kept: Option<&Kept>,
     ) -> Result<Settled, QuasiStaticError> {
         let (mut broken, mut rounds) = (0, 0);
+        let (mut gave_up, mut fails) = (false, false);
         let interval = self.interval;
         let residual = loop {
             let (count, residual) = self.equilibrium(u)?;
@@ -319,6 +392,13 @@ impl Run<'_> {
             broken += now.broken;
             rounds += 1;
             self.is_torn = true;
+            if let Some(kept) = kept {
+                fails = fails || now.broken > 0 || kept.is_passed(&*self.system, u);
+                gave_up = fails && kept.limits.may_give_up;
+                if gave_up {
+                    break residual;
+                }
+            }
             self.aids.progress.tell(&format!(
                 "{iterations} iterations, {broken} bonds broken in this load step"
             ));
@@ -337,6 +417,8 @@ impl Run<'_> {
             rounds,
             iterations,
             residual,
+            gave_up,
+            fails,
         })
     }
 

@@ -148,11 +148,12 @@ impl BodyHistory for Bundle {
     fn account_for_breaks(&mut self, _at: &Halfway<'_>) {}
 
     fn damage_state(&self) -> Vec<u64> {
-        Vec::new()
+        self.intact.iter().map(|&i| u64::from(i)).collect()
     }
 
     fn restore_damage(&mut self, state: &[u64]) -> bool {
-        state.is_empty()
+        self.intact = state.iter().map(|&i| i == 1).collect();
+        true
     }
 
     fn body_state(&self) -> Option<&dyn BodyState> {

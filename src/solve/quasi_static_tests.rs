@@ -100,7 +100,7 @@ fn go(
         drive,
         params,
         Aids::default(),
-        &of(times),
+        Pacing::Listed(&of(times)),
         &mut state,
         &mut |s| {
             observe(s);
@@ -277,7 +277,7 @@ fn runs_resume() {
             &Grip::Displacement,
             params,
             Aids::default(),
-            &of(&times),
+            Pacing::Listed(&of(&times)),
             &mut state,
             &mut |_| ControlFlow::Continue(()),
         )
@@ -292,7 +292,7 @@ fn runs_resume() {
             &Grip::Displacement,
             params,
             Aids::default(),
-            &of(&times),
+            Pacing::Listed(&of(&times)),
             &mut state,
             &mut |s| {
                 if s.state.step == stop {
@@ -305,6 +305,70 @@ fn runs_resume() {
         .expect("equilibrium");
     }
     assert_eq!(whole, (state, bundle.intact));
+}
+
+/// Adaptive load steps of a bundle to a displacement, up to a number of them; appends times and fibres broken.
+fn adaptive(bundle: &mut Bundle, state: &mut LoadState, last: u64, seen: &mut Vec<(f64, u64)>) {
+    let pacing = Pacing::Adaptive(Adaptive {
+        end: 1.3,
+        accuracy: ACCURACY,
+    });
+    let params = QuasiStaticParams::default();
+    let mut observe = |s: &LoadStep<'_>| {
+        seen.push((s.time, s.state.broken));
+        match s.state.step == last {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    };
+    let grip = Grip::Displacement;
+    run(
+        bundle,
+        &grip,
+        params,
+        Aids::default(),
+        pacing,
+        state,
+        &mut observe,
+    )
+    .expect("equilibrium");
+}
+
+/// Part of a load to which adaptive steps find it.
+const ACCURACY: f64 = 0.01;
+
+#[test]
+fn adaptive_steps_find_the_load_of_each_fibre() {
+    let (mut bundle, mut state) = (Bundle::new(30, 10.0), LoadState::at_rest(3));
+    let mut seen = Vec::new();
+    adaptive(&mut bundle, &mut state, u64::MAX, &mut seen);
+    assert_eq!(seen.last().map(|s| s.0), Some(1.3));
+    // fibre k breaks at its elongation k/30, with those after it: t = e (1 + alive/10)
+    let exact = (1..=30).map(|k| f64::from(k) / 30.0 * (1.0 + f64::from(31 - k) / 10.0));
+    let exact: Vec<f64> = exact.take_while(|t| *t < 1.3).collect();
+    assert!(exact.windows(2).all(|t| t[0] < t[1]) && exact.len() > 10);
+    for (k, t) in exact.iter().enumerate() {
+        let step = seen.iter().position(|s| s.1 > k as u64).unwrap();
+        let (before, after) = (seen[step - 1].0, seen[step].0);
+        assert!(before < *t && *t <= after, "{before} {t} {after}");
+        let least = ACCURACY * before.max(0.13) * (1.0 + 1e-6);
+        assert!(after - before <= least, "{before} {t} {after}");
+    }
+    // steps of equal length would be 1000
+    println!("{} steps for {} fibres", seen.len(), exact.len());
+    assert!(seen.len() < 250);
+}
+
+#[test]
+fn adaptive_steps_resume() {
+    let new = || (Bundle::new(30, 10.0), LoadState::at_rest(3), Vec::new());
+    let (mut whole, mut state, mut seen) = new();
+    adaptive(&mut whole, &mut state, u64::MAX, &mut seen);
+    let (mut parts, mut resumed, mut again) = new();
+    for stop in [17, u64::MAX] {
+        adaptive(&mut parts, &mut resumed, stop, &mut again);
+    }
+    assert_eq!((seen, state, whole.intact), (again, resumed, parts.intact));
 }
 
 #[test]
@@ -321,7 +385,7 @@ fn trouble_is_named() {
         &Grip::Displacement,
         params,
         Aids::default(),
-        &of(&[1.0]),
+        Pacing::Listed(&of(&[1.0])),
         &mut short,
         &mut none,
     );
@@ -335,7 +399,7 @@ fn trouble_is_named() {
         &Grip::Displacement,
         params,
         Aids::default(),
-        &of(&[3.0]),
+        Pacing::Listed(&of(&[3.0])),
         &mut state,
         &mut none,
     );
@@ -359,7 +423,7 @@ fn trouble_is_named() {
         &drive,
         few,
         Aids::default(),
-        &of(&[1.0]),
+        Pacing::Listed(&of(&[1.0])),
         &mut state,
         &mut none,
     );
@@ -375,7 +439,7 @@ fn trouble_is_named() {
         &drive,
         few,
         Aids::default(),
-        &of(&[f64::NAN]),
+        Pacing::Listed(&of(&[f64::NAN])),
         &mut LoadState::at_rest(40),
         &mut none,
     );

@@ -102,6 +102,49 @@ fn a_strip_goes_on_from_its_checkpoint() {
 }
 
 #[test]
+fn steps_that_are_found_bear_the_peak_of_fine_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let loads = |steps: &str| {
+        let typed = STRIP
+            .replace("{softening}", "bilinear")
+            .replace("{opening}", "0.006*t")
+            .replace("{steps}", steps);
+        write(folder.path(), "s.toml", &typed);
+        let said = run(folder.path(), &["s.toml"]);
+        assert!(!steps.contains("auto") || said.contains("as long as nothing fails in them"));
+        column(&folder.path().join("out/s_history.csv"), "right_reaction_x")
+    };
+    let [fine, found, coarse] = ["300", "\"auto\"", "10"].map(loads);
+    let peak = |loads: &[f64]| loads.iter().fold(0.0, |most: f64, x| most.max(*x));
+    let off = [&found, &coarse].map(|loads| peak(loads) / peak(&fine) - 1.0);
+    println!("{off:?} in {} steps and 10", found.len() - 1);
+    assert!(off[0].abs() < 0.01, "{off:?}");
+    assert!(found.len() < 150, "{}", found.len());
+}
+
+#[test]
+fn steps_that_are_found_go_on_from_a_checkpoint() {
+    let typed = STRIP
+        .replace("{softening}", "bilinear")
+        .replace("{opening}", "0.006*t")
+        .replace(
+            "steps = {steps}",
+            "steps = \"auto\"\naccuracy = 0.05\ncheckpoint-every = 3",
+        )
+        .replace(
+            "spacing = 1.5, origin = [-11.25, -9.75]",
+            "spacing = 2, origin = [-11, -10]",
+        )
+        .replace("horizon = 4.5", "horizon = 4");
+    let whole = crate::resumes_with_the_same_bytes(&typed);
+    let spent = column(
+        &whole.path().join("out/bar_history.csv"),
+        "dissipated_energy",
+    );
+    assert!(*spent.last().unwrap() > 0.0);
+}
+
+#[test]
 fn elements_that_rotate_by_a_part_of_the_softening_stretch_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let turned = |angle: f64| {
@@ -155,6 +198,17 @@ fn what_softening_bonds_cannot_do_is_refused_by_name() {
         "fracture-energy = -1",
         "must lie between",
     );
+    refused(
+        "steps = 8",
+        "steps = 8\naccuracy = 0.01",
+        "`solve.quasi-static.accuracy` is set and the load steps are given",
+    );
+    refused(
+        "steps = 8",
+        "steps = \"auto\"\naccuracy = 0.5",
+        "must lie between 1e-5 and 0.2",
+    );
+    refused("steps = 8", "steps = \"aut\"", "`aut`");
 }
 
 /// A plate with a crack whose tips lie two horizons from the seam.

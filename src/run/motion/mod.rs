@@ -40,6 +40,7 @@ pub(crate) mod impact;
 pub(crate) mod impact_record;
 pub(crate) mod initial_state;
 mod inside_step;
+mod load_step_params;
 mod material_stretches;
 mod newton_factors;
 mod parted;

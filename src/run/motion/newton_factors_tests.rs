@@ -13,7 +13,7 @@ use crate::run::motion::time_dependent_loads::SceneDrive;
 use crate::scene::Source;
 use crate::scene::validated::Scene;
 use crate::solve::krylov::LinearMap;
-use crate::solve::quasi_static::{self, Aids, LoadState, QuasiStaticParams, Refactor};
+use crate::solve::quasi_static::{self, Aids, LoadState, Pacing, QuasiStaticParams, Refactor};
 use crate::system::{FailureUpdate, Interval};
 
 const STEPS: u64 = 4;
@@ -69,7 +69,7 @@ impl Look for Solve {
             &drive,
             params,
             aids,
-            &times,
+            Pacing::Listed(&times),
             &mut state,
             &mut |seen| {
                 found.push((seen.residuals.to_vec(), seen.factorisations));

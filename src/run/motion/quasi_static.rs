@@ -15,6 +15,7 @@ use super::guard::energies_are_apart;
 use super::impact::{BodyOnly, impacted};
 use super::impact_record::ImpactRecord;
 use super::inside_step::InsideStep;
+use super::load_step_params::{equilibrium_params, step_choice};
 use super::parted::has_parted;
 use super::saved::{EdgeReached, Saved, StepChoice};
 use super::setup::{ModelSetup, laid_out, opened, restore};
@@ -24,7 +25,6 @@ use super::time_dependent_loads::SceneDrive;
 use super::writer::{Moment, Recorder};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointFile;
-use crate::observe::report::number;
 use crate::observe::summary::{
     Decision, Ended, MotionSummary, Rotation, RunSummary, Timings, peak_memory_bytes,
 };
@@ -37,13 +37,13 @@ use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
 use crate::run::warnings::{of_elements, unusual_stretch, warnings, without_response};
 use crate::scene::solve::QuasiStatic as Spec;
-use crate::scene::spec::{EdgeSpec, LoadStepSpec, WhenPartedSpec};
+use crate::scene::spec::{EdgeSpec, WhenPartedSpec};
 use crate::scene::validated::Scene;
 use crate::solve::explicit::{Drive, State};
 use crate::solve::krylov::LinearMap;
 use crate::solve::quasi_static::{
-    self, Aids, Equilibrium, LoadState, LoadStep, QuasiStaticError, QuasiStaticParams, Refactor,
-    TangentFactors,
+    self, Adaptive, Aids, LoadState, LoadStep, Pacing, QuasiStaticError, QuasiStaticParams,
+    Refactor, TangentFactors,
 };
 use crate::system::SemiDiscrete;
 use crate::{
@@ -72,12 +72,12 @@ fn driven<'a, const D: usize>(
     model: &'a Model<D>,
     rest: &'a RunSettings<D>,
     start: &[f64],
-    pace: StepChoice,
+    spec: &Spec,
 ) -> Result<SceneDrive<'a, D>, RunError> {
-    let steps = (pace.step, pace.steps);
+    let steps = (spec.duration / spec.steps as f64, spec.steps as u64);
     let at_rest = BodyForces::Consistent;
     let drive = SceneDrive::new(model, &rest.conditions, start, steps, at_rest)?;
-    Ok(drive.with_impactors(&rest.impactors, pace.steps))
+    Ok(drive.with_impactors(&rest.impactors, steps.1))
 }
 
 /// Load steps from the beginning or a checkpoint.
@@ -105,7 +105,7 @@ fn load_steps<const D: usize>(
     let made = leads.made(progress)?;
     leads.time(&mut watch, &mut timings);
     let thermal = rest.stresses.thermal.as_ref();
-    let drive = driven(model, rest, &begin.u, pace)?;
+    let drive = driven(model, rest, &begin.u, spec)?;
     let drive = drive.heated(thermal, operator, (system.as_ref(), is_linear))?;
     let at = saved.as_ref();
     restore(system.as_mut(), at, &file)?;
@@ -211,40 +211,6 @@ fn ended_before<const D: usize>(edge: Option<EdgeReached>, rest: &RunSettings<D>
     }
 }
 
-/// Load steps of equal length.
-fn step_choice(spec: &Spec) -> StepChoice {
-    StepChoice {
-        step: spec.duration / spec.steps as f64,
-        steps: spec.steps as u64,
-        stable: 0.0,
-        certified: 0.0,
-        site: 0,
-        since: (0, 0.0),
-    }
-}
-
-/// Returns the parameters by which each load step finds its equilibrium.
-fn equilibrium_params(spec: &Spec, choices: &mut Vec<Decision>) -> QuasiStaticParams {
-    let params = QuasiStaticParams {
-        equilibrium: match spec.method {
-            LoadStepSpec::Implicit => Equilibrium::Newton,
-            LoadStepSpec::Relaxation => Equilibrium::Relaxation,
-        },
-        tolerance: spec.tolerance,
-        max_iterations: spec.max_iterations,
-        ..QuasiStaticParams::default()
-    };
-    choices.push(Decision {
-        choice: match params.equilibrium {
-            Equilibrium::Newton => "Newton's method, without a matrix",
-            Equilibrium::Relaxation => "adaptive dynamic relaxation",
-        }
-        .to_owned(),
-        why: format!("{} load steps to t = {}", spec.steps, number(spec.duration)),
-    });
-    params
-}
-
 /// The state that the first load step begins with: the one that a checkpoint keeps (fields, time, step, work, broken bonds), and the one that the solver advances.
 fn first_state(begin: State, saved: Option<Saved>) -> (State, LoadState) {
     let mut loaded = LoadState::at_rest(begin.u.len());
@@ -254,6 +220,7 @@ fn first_state(begin: State, saved: Option<Saved>) -> (State, LoadState) {
         // the state at t = 0 counts as one of the driver's steps
         loaded.step = state.step + 1;
         loaded.broken = state.broken;
+        (loaded.time, loaded.stride) = (state.time, saved.pace.step);
     }
     loaded.u.clone_from(&state.u);
     (state, loaded)
@@ -324,8 +291,15 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         let (progress, pace, drive) = (self.progress, self.pace, self.drive);
         let spec = self.spec;
         let times = |k: u64| (k <= pace.steps).then(|| spec.time_of(k));
-        progress.stage("load steps", Some(pace.steps));
-        progress.advance(self.state.step);
+        let pacing = match spec.accuracy {
+            None => Pacing::Listed(&times),
+            Some(accuracy) => Pacing::Adaptive(Adaptive {
+                end: spec.duration,
+                accuracy,
+            }),
+        };
+        progress.stage("load steps", Some(spec.steps as u64));
+        progress.advance(self.part_done(self.state.time));
         let clock = Instant::now();
         // before the state at the start ending loses nothing
         if loaded.step > 0 {
@@ -344,7 +318,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         let laws = &model.local_laws(&self.rest.local_laws);
         let mut observe = |seen: &LoadStep<'_>| self.observe(seen);
 
-        let done = quasi_static::run(system, drive, params, aids, &times, loaded, &mut observe);
+        let done = quasi_static::run(system, drive, params, aids, pacing, loaded, &mut observe);
         match done {
             Err(QuasiStaticError::Interrupted { .. }) => self.go_back(system, loaded.step)?,
             done => drop(done.map_err(|error| explained(error.into(), model, laws))?),
@@ -384,6 +358,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
     /// Watches and writes a load step; says whether the next is taken.
     fn observe(&mut self, seen: &LoadStep<'_>) -> ControlFlow<()> {
         let begins = seen.state.step == 1;
+        let before = self.part_done(self.state.time);
         self.take_state(seen);
         self.doubts.watch(seen);
         let now = (self.state.step, self.state.time);
@@ -396,12 +371,14 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         if begins {
             self.options.begin_steps();
         }
-        if let Err(error) = self.write(seen, begins) {
+        let done = self.part_done(self.state.time);
+        let every = self.spec.output_every as u64;
+        if let Err(error) = self.write(seen, begins, done / every > before / every) {
             self.failed = Some(error);
             return ControlFlow::Break(());
         }
         let state = &self.state;
-        self.progress.advance(u64::from(!begins));
+        self.progress.advance(self.part_done(state.time) - before);
         self.progress.tell(&format!(
             "t = {:.3e}, {} iterations, {} bonds broken",
             state.time, seen.iterations, state.broken
@@ -420,6 +397,9 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         state.time = seen.time;
         state.u.copy_from_slice(&seen.state.u);
         state.broken = seen.state.broken;
+        if self.spec.accuracy.is_some() {
+            self.pace.step = seen.state.stride;
+        }
         self.iterations += seen.iterations;
         self.factorisations += seen.factorisations;
         if self.options.interrupt.is_some() {
@@ -440,7 +420,18 @@ impl<const D: usize> LoadStepObserver<'_, D> {
 
     /// Returns true if the state is that of the last load step.
     fn is_last(&self) -> bool {
-        self.state.step == self.pace.steps
+        match self.spec.accuracy {
+            None => self.state.step == self.pace.steps,
+            Some(_) => self.state.time >= self.spec.duration,
+        }
+    }
+
+    /// Load steps that are done at a time, of adaptive ones the intervals that they divide.
+    fn part_done(&self, time: f64) -> u64 {
+        match self.spec.accuracy {
+            None => self.state.step,
+            Some(_) => (time / self.spec.duration * self.spec.steps as f64 + 1e-6) as u64,
+        }
     }
 
     /// Finds the reason, if any, to end the run with this load step: damage at the edge, an interrupt, elements that have rotated too far, a body that has parted.
@@ -464,8 +455,13 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         self.rotation = found.and_then(|r| self.rotations.told(r.degrees, r.place, 0.0, 0.0, when));
     }
 
-    /// Writes a row of the history, and the fields and a checkpoint where they are due.
-    fn write(&mut self, seen: &LoadStep<'_>, begins: bool) -> Result<(), ObserveError> {
+    /// Writes a row of the history, the fields where they are due, and a checkpoint where that is.
+    fn write(
+        &mut self,
+        seen: &LoadStep<'_>,
+        begins: bool,
+        is_due: bool,
+    ) -> Result<(), ObserveError> {
         let loads: Vec<f64> = self
             .drive
             .prescribed()
@@ -484,7 +480,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
                 self.ended,
                 Ended::DamageAtEdge | Ended::ElementsRotated | Ended::Parted
             )
-            || state.step.is_multiple_of(self.spec.output_every as u64);
+            || is_due;
         let leave = self.ended != Ended::Finished || (last && recorder.keeps_state());
         if begins {
             recorder.begin(&moment);
@@ -519,7 +515,10 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         let motion = MotionSummary {
             ended: self.ended,
             steps: state.step,
-            of_steps: self.pace.steps,
+            of_steps: match self.spec.accuracy {
+                None => self.pace.steps,
+                Some(_) => state.step,
+            },
             time: state.time,
             step: self.pace.step,
             stable_step: None,

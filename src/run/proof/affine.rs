@@ -1,7 +1,7 @@
 //! Affine fields through the model of a scene: the balance of each row under a constant stress, and the error of the stress where a row is out of balance.
 
 use super::classes::{Layout, RowClass, Skin, Unbalanced, limits, told};
-use super::fields::{boundary_integrals, gradients, nodal_forces, of_stress};
+use super::fields::{boundary_integrals, gradients, nodal_forces, of_stress, volume_of_row};
 use super::loads::centre;
 use super::patch::{Around, PatchField, StressError, stress_errors};
 use super::surface::{self, Boundary, FacetKind, add_tractions};
@@ -193,19 +193,6 @@ fn prove<const D: usize>(
             },
         },
     )
-}
-
-/// Part of the largest cell of a site that its row stands for at least.
-const LEAST: f64 = 0.01;
-
-/// Returns the volume over which the force of a row is taken \[m^D\]: that of its site, and not what little, or less than nothing, cuts and nodes that follow leave it of cells whose round-off the row has.
-fn volume_of_row<const D: usize>(model: &Model<D>, site: usize) -> f64 {
-    let own = model.sites[site].volume;
-    if !model.mesh.embedded.has_patch() || model.point_of(site).is_some() {
-        return own;
-    }
-    let cells = model.cells_of_site(site).map(|(c, _)| model.mesh.cell_volume(c).abs());
-    cells.map(|volume| LEAST * volume).fold(own, f64::max)
 }
 
 fn is_point<const D: usize>(site: &Site<D>) -> bool {

@@ -161,3 +161,18 @@ pub(super) fn nodal_forces<const D: usize>(
         }
     }
 }
+
+/// Part of the largest cell of a site that its row stands for at least.
+const LEAST: f64 = 0.01;
+
+/// Returns the volume over which the force of a row is taken \[m^D\]: that of its site, and not what little, or less than nothing, cuts and nodes that follow leave it of cells whose round-off the row has.
+pub(super) fn volume_of_row<const D: usize>(model: &Model<D>, site: usize) -> f64 {
+    let own = model.sites[site].volume;
+    if !model.mesh.embedded.has_patch() || model.point_of(site).is_some() {
+        return own;
+    }
+    let cells = model
+        .cells_of_site(site)
+        .map(|(c, _)| model.mesh.cell_volume(c).abs());
+    cells.map(|volume| LEAST * volume).fold(own, f64::max)
+}

@@ -91,11 +91,14 @@ pub enum GrowingModesSpec {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct QuasiStaticSpec {
-    /// Number of load steps of equal length, or the list of their times, the last of which takes the place of `duration`.
+    /// Number of load steps of equal length, the list of their times, the last of which takes the place of `duration`, or "auto": as long as nothing fails in them, and as short as `accuracy` where something does.
     pub steps: Steps,
     /// Value of t at the last step; 1 if left out.
     #[serde(default)]
     pub duration: Option<Number>,
+    /// Length of a step of `steps = "auto"` in which bonds break over its time: the accuracy of the load at which they do; 0.01 if left out.
+    #[serde(default)]
+    pub accuracy: Option<Number>,
     /// Solution method of each step; "implicit" if left out.
     #[serde(default)]
     pub method: LoadStepSpec,
