@@ -310,7 +310,11 @@ fn elements_choice<const D: usize>(model: &Model<D>) -> Option<Decision> {
             true => format!("elements of {most:.1} spacings beside the points"),
             false => format!("elements of {least:.1} to {most:.1} spacings beside the points"),
         },
-        why: "as the mesh has them; one to four are usual".to_owned(),
+        why: match mesh.embedded.has_patch() {
+            true => "those of the rim",
+            false => "as the mesh has them; one to four are usual",
+        }
+        .to_owned(),
     })
 }
 

@@ -139,7 +139,7 @@ fn with_rim<const D: usize>(
     let lattice = before.peridynamics.as_ref().map(|p| &p.points);
     let Some(&Points::Lattice { spacing, origin }) = lattice else {
         return Err(conflict(
-            "`zones.rim = \"own\"` is set and the points are no lattice".to_owned(),
+            "a rim of its own lies on a lattice, and the points are none".to_owned(),
             "use peridynamics.points.lattice, or rim = \"mesh\"",
         ));
     };
@@ -287,7 +287,7 @@ fn refuse_others(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
         None => Ok(()),
         Some((key, _)) => Err(SceneError::new(
             SceneErrorKind::Conflict,
-            format!("`zones.rim = \"own\"` and `{key}` are set"),
+            format!("a rim of its own and `{key}` do not go together"),
         )
         .label(span.clone(), "a layer of elements on the lattice")
         .help(format!("leave out {key}, or use rim = \"mesh\""))),
@@ -306,7 +306,7 @@ fn reach<const D: usize>(spec: &SceneSpec, before: &Scene<D>) -> Result<f64, Str
         Some(TransitionSpec::Around(width)) => width.value,
         Some(_) => {
             return Err(
-                "`zones.rim = \"own\"` needs `zones.transition.around`, a width: the rim reaches as far"
+                "a rim of its own needs `zones.transition.around`, a width: it reaches as far"
                     .to_owned(),
             );
         }
@@ -320,7 +320,7 @@ fn reach<const D: usize>(spec: &SceneSpec, before: &Scene<D>) -> Result<f64, Str
     };
     match horizon {
         Some(horizon) => Ok(width + families * horizon),
-        None => Err("`zones.rim = \"own\"` needs one horizon".to_owned()),
+        None => Err("a rim of its own needs one horizon".to_owned()),
     }
 }
 

@@ -9,7 +9,7 @@ use super::spec::{
     BeyondLimitSpec, ExplicitSpec, GrowingModesSpec, LoadStepSpec, QuasiStaticSpec, SolveSpec,
     WhenPartedSpec,
 };
-use super::value::{Count, Every, Number, StepTimes};
+use super::value::{Count, Every, INTERVALS, Number, StepTimes};
 use crate::observe::checkpoint::Pace;
 use crate::solve::sub_cycling;
 
@@ -349,9 +349,6 @@ fn listed(spec: &QuasiStaticSpec, times: &[f64]) -> Result<Vec<f64>, SceneError>
     Ok(times.to_vec())
 }
 
-/// Intervals of a load that adaptive steps divide.
-const FINEST: usize = 1000;
-
 /// Accuracy of the load of adaptive steps.
 const ACCURACY: f64 = 0.01;
 
@@ -402,7 +399,7 @@ fn quasi_static(spec: &QuasiStaticSpec) -> Result<QuasiStatic, SceneError> {
             let listed = listed(spec, times)?;
             (listed.len(), listed)
         }
-        StepTimes::Auto => (FINEST, Vec::new()),
+        StepTimes::Auto => (INTERVALS, Vec::new()),
     };
     let accuracy = accuracy(spec)?;
     let duration = match &spec.duration {

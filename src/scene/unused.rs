@@ -8,6 +8,7 @@ use super::peridynamics::Peridynamics;
 use super::region::Region;
 use super::spec::{SceneSpec, ZonesNeeded};
 use super::validated::Scene;
+use crate::mesh::Mesh;
 use crate::model::Zone;
 use crate::observe::report::number;
 use crate::scene::points::Points;
@@ -151,7 +152,7 @@ impl<const D: usize> Parts<'_, D> {
             return None;
         };
         let (low, high) = shape.bounds();
-        let (least, most) = self.scene.mesh.bounds();
+        let (least, most) = body_bounds(&self.scene.mesh);
         let a = (0..D).find(|&a| {
             let drawn = high[a] - low[a] + 2.0 * margin;
             let within = (high[a] + margin).min(most[a]) - (low[a] - margin).max(least[a]);
@@ -243,4 +244,18 @@ impl<const D: usize> Parts<'_, D> {
             found || beside.len() > BESIDE
         })
     }
+}
+
+/// Corners of the box around a body, of which cells of a patch may lie in part only.
+fn body_bounds<const D: usize>(mesh: &Mesh<D>) -> (Vector<D>, Vector<D>) {
+    if !mesh.embedded.has_patch() {
+        return mesh.bounds();
+    }
+    let pieces = &mesh.embedded.pieces;
+    let whole = (0..mesh.cell_count()).filter(|&c| !pieces.contains_key(&(c as u32)));
+    let nodes: Vec<u32> = whole.flat_map(|c| mesh.cell(c)).copied().collect();
+    let corners = pieces.values().flatten().flat_map(|piece| &piece[..=D]);
+    corners.fold(mesh.bounds_of(&nodes), |(low, high), x| {
+        (low.inf(x), high.sup(x))
+    })
 }

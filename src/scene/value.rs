@@ -57,6 +57,20 @@ pub struct Steps {
     pub span: Span,
 }
 
+/// Intervals of a load that load steps of any length divide.
+pub(crate) const INTERVALS: usize = 1000;
+
+impl Steps {
+    /// Returns the number of load steps, of those that are found on the way the largest that is usual.
+    pub fn count(&self) -> usize {
+        match &self.choice {
+            StepTimes::Equal(number) => *number,
+            StepTimes::Listed(times) => times.len(),
+            StepTimes::Auto => INTERVALS,
+        }
+    }
+}
+
 /// Load steps of equal length, at the times that are listed, or found on the way.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StepTimes {

@@ -42,13 +42,13 @@ fn the_plate_itself_runs() {
 
 #[test]
 fn keys_that_do_not_go_together() {
-    let rim = "`zones.rim = \"own\"`";
+    let rim = "a rim of its own";
     refused(
         &plate()
             .set("peridynamics.points", "cells")
             .horizon(8.0)
             .coupling("splice"),
-        &[rim, "points", "no lattice"],
+        &[rim, "points are none"],
     );
     refused(
         &plate()
