@@ -254,6 +254,7 @@ horizon = 0.15
 points.lattice = {{ spacing = 0.05, origin = [0.013, 0.031] }}
 [zones]
 nonlocal = {{ ball = {{ center = [1.06, 1.06], radius = 0.6 }} }}
+skin = "none"
 [coupling.truncated]
 [conditions.held.displacement]
 on = "left"
