@@ -156,8 +156,8 @@ fn with_rim<const D: usize>(
         per_cell: 1,
         within: around(draft, placed, &before),
         has_masses: matches!(draft.solve, Solve::Explicit(_)),
-        // families lack points at surfaces, and elements carry all but what may fail
-        has_skin: typed_skin.map_or(!may_part, |skin| skin == SkinSpec::FreeSurfaces),
+        has_skin: lays_skin(draft.spec, &before, may_part)
+            .map_err(|what| conflict(what, "use coupling = \"truncated\", or rim = \"mesh\""))?,
         may_part,
         reach: reach(draft.spec, &before)
             .map_err(|what| conflict(what, "or use rim = \"mesh\""))?,
@@ -351,6 +351,24 @@ fn around<const D: usize>(
     let cells = (0..mesh.cell_count()).filter(|&c| may_meet(c));
     let nodes: Vec<u32> = cells.flat_map(|c| mesh.corners(c)).copied().collect();
     mesh.bounds_of(&nodes)
+}
+
+/// Returns true if elements are to lie along the surface of the body: families lack points there, and elements carry all but what may fail.
+fn lays_skin<const D: usize>(
+    spec: &SceneSpec,
+    before: &Scene<D>,
+    may_part: bool,
+) -> Result<bool, String> {
+    let law = before.point_law.linearised();
+    let ends_on_faces = before.coupling.build(law).interface().faces;
+    match spec.zones.skin {
+        None => Ok(ends_on_faces && !may_part),
+        Some(SkinSpec::None) => Ok(false),
+        Some(SkinSpec::FreeSurfaces) if ends_on_faces => Ok(true),
+        Some(SkinSpec::FreeSurfaces) => {
+            Err("a rim of its own lays `zones.skin` for bonds that end on faces alone".to_owned())
+        }
+    }
 }
 
 /// As [`embedded`], without a skin that the scene does not ask for where the zone is nowhere thick enough for one.
