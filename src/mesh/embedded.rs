@@ -11,6 +11,9 @@ use super::Facet;
 use super::facet::{BoundaryFacet, key};
 use crate::tensor::{Tensor, Vector, inverse};
 
+/// Distance from a plane between cells of a patch within which places lie in it, in edges.
+pub(crate) const IN_PLANE: f64 = 1e-7;
+
 /// A quadrature rule of a cut cell: reference coordinates and weights.
 pub type CutRule = Vec<([f64; 3], f64)>;
 
@@ -66,6 +69,20 @@ pub struct Covered<const D: usize> {
     pub edge: f64,
     /// Its cells.
     pub cells: FxHashSet<[i32; D]>,
+}
+
+impl<const D: usize> Covered<D> {
+    /// Returns true if places lie in a plane between cells.
+    pub fn is_plane(&self, places: impl Iterator<Item = Vector<D>> + Clone) -> bool {
+        let at = |x: Vector<D>, axis: usize| (x - self.corner)[axis] / self.edge;
+        let first = places.clone().next().unwrap_or(self.corner);
+        (0..D).any(|axis| {
+            let plane = at(first, axis).round();
+            places
+                .clone()
+                .all(|x| (at(x, axis) - plane).abs() < IN_PLANE)
+        })
+    }
 }
 
 impl<const D: usize> Default for Embedded<D> {

@@ -29,6 +29,7 @@ mod cell_shape;
 mod conformity;
 mod dilate_erode;
 mod embedded;
+pub(crate) use embedded::IN_PLANE;
 mod error;
 mod facet;
 pub mod generate;

@@ -4,6 +4,9 @@ use crate::model::ModelError;
 use crate::run::error::RunError;
 use crate::scene::validated::Scene;
 
+/// The faces along which a coupling is tried where they are not those of the mesh.
+const OWN_RIM: &str = "with a rim of its own";
+
 /// Does something with a scene; where its coupling was chosen and turns out not to hold, with the next choice, which then says what was tried.
 ///
 /// # Errors
@@ -20,7 +23,16 @@ fn with_each<const D: usize, T>(
     then: &mut dyn FnMut(Scene<D>) -> Result<T, RunError>,
 ) -> Result<T, RunError> {
     let Some(mut other) = scene.otherwise.take() else {
-        return then(scene);
+        let (along_faces, refused) = (tried(&scene), scene.refused_rim.take());
+        return then(scene).map_err(|error| match refused {
+            Some(why) if error.is_of_coupling() => RunError::NoCoupling {
+                tried: vec![
+                    (format!("{along_faces} {OWN_RIM}"), RunError::Rim(why)),
+                    (along_faces, error),
+                ],
+            },
+            _ => error,
+        });
     };
     // what whoever holds the scene has set since it was read; its layout is its own
     other.output = scene.output.clone();
@@ -55,7 +67,7 @@ fn with_each<const D: usize, T>(
 fn tried<const D: usize>(scene: &Scene<D>) -> String {
     let name = scene.coupling.traits().name;
     match scene.mesh.embedded.has_patch() {
-        true => format!("`{name}` with a rim of its own"),
+        true => format!("`{name}` {OWN_RIM}"),
         false => format!("`{name}`"),
     }
 }

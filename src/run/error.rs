@@ -94,6 +94,9 @@ pub enum RunError {
         /// The couplings in the order in which they were tried, and why each does not hold.
         tried: Vec<(String, RunError)>,
     },
+    /// The zone cannot have a rim of its own.
+    #[error("{0}")]
+    Rim(String),
     /// The state cannot be carried over to other zones.
     #[error(transparent)]
     Carry(#[from] CarryError),

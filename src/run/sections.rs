@@ -313,7 +313,7 @@ fn load_beyond<const D: usize>(
     condition: &Condition<D>,
     follows: &dyn Fn(&Vector<D>) -> Vec<(u32, f64)>,
 ) -> Option<LoadBeyond<D>> {
-    let mut points = points_beyond(model, section, condition);
+    let mut points = points_beyond(model, section, (number, condition));
     if points.is_empty() {
         return None;
     }
@@ -353,9 +353,12 @@ fn load_beyond<const D: usize>(
 fn points_beyond<const D: usize>(
     model: &Model<D>,
     section: &Section<D>,
-    condition: &Condition<D>,
+    (number, condition): (usize, &Condition<D>),
 ) -> Vec<LoadPoint<D>> {
-    let (mesh, beyond) = (&model.mesh, &section.beyond);
+    let beyond = &section.beyond;
+    let uncut = section.uncut.as_deref();
+    let mesh = uncut.map_or(&model.mesh, |body| &body.mesh);
+    let condition = uncut.map_or(condition, |body| &body.conditions[number]);
     let mut points = Vec::new();
     let mut add = |x: &Vector<D>, weight: f64, normal: &Vector<D>| {
         if section.inside.contains(x, beyond.tolerance) {
@@ -390,7 +393,7 @@ fn points_beyond<const D: usize>(
                 beyond.cell_points(mesh, c, |x, w| {
                     // a void in the zone has no weight
                     let is_void = voids.iter().any(|v| v.signed_distance(x) < 0.0);
-                    if model.is_element(c) || !is_void {
+                    if !is_void || uncut.is_none() && model.is_element(c) {
                         add(x, w, &none);
                     }
                 });

@@ -301,7 +301,6 @@ impl<'a, const D: usize> Draft<'a, D> {
         if matches!(self.solve, Solve::Explicit(_)) {
             densities(spec, &self.materials)?;
         }
-        let peridynamic = used[0];
         self.check_laws(&selected.coupling, &used, &zones)?;
         let breaking = failure::breaking(spec, &self.materials, &used, interfaces, mesh)?;
         let elements = self.elements(&selected.coupling, &used, law.as_ref(), breaking.bonds)?;
@@ -313,7 +312,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             &breaking,
             (peridynamics.as_ref()).map(|p| (p, law.as_ref())),
             mesh,
-            |c| self.cell_material[c] == peridynamic,
+            |c| self.cell_material[c] == used[0],
         )?;
         let output = output::output(spec, (mesh, self.kinematics), &voids, self.name)?;
         let scene = Scene {
@@ -343,6 +342,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             solver: self.solver,
             output,
             otherwise: None,
+            refused_rim: None,
             unused: Vec::new(),
             fingerprint: self.fingerprint.clone(),
         };

@@ -1,10 +1,18 @@
 //! The scene with a rim of its own around the nonlocal zone: horizon and points by the mesh as it is, everything else by the mesh with the patch.
 
-use super::conditions::Condition;
+mod conflict;
+mod held_places;
+
+use std::sync::Arc;
+
+use self::conflict::{conflict_with, places_of};
+use self::held_places::HeldPlaces;
+
 use super::coupling_selection::follows;
 use super::draft::Draft;
 use super::error::{SceneError, SceneErrorKind};
 use super::region::{self, Region};
+use super::section::UncutBody;
 use super::source::Span;
 use super::spec::{
     CouplingSpec, LatticeStart, RimSpec, SceneSpec, SkinSpec, TransitionSpec, TruncatedSpec,
@@ -14,12 +22,10 @@ use super::unused::Parts;
 use super::validated::Scene;
 use super::zones::Placed;
 use crate::fem::Locator;
-use crate::mesh::facet_corners;
-use crate::model::patch::{self, PatchError, PatchLattice, Patched, Replaced};
+use crate::model::patch::{self, PatchError, PatchLattice, Patched, Places, Replaced};
 use crate::model::{Reach, Zone};
 use crate::observe::report::number;
 use crate::observe::summary::Decision;
-use crate::scene::conditions::Support;
 use crate::scene::points::Points;
 use crate::scene::solve::Solve;
 use crate::tensor::Vector;
@@ -78,7 +84,8 @@ fn before_others<const D: usize>(
     };
     let law = scene.point_law.linearised();
     let interface = scene.coupling.build(law).interface();
-    let gains = interface.faces || interface.overlap && is_beside_others_than_boxes(&scene);
+    let ends_on_faces = interface.faces || interface.feet;
+    let gains = ends_on_faces || interface.overlap && is_beside_others_than_boxes(&scene);
     if !gains || follows(&scene.mesh, &scene.zones, (*spacing, origin), OFF) {
         return scene;
     }
@@ -89,10 +96,12 @@ fn before_others<const D: usize>(
             rim
         }
         Err(refused) => {
+            let why = refused.message().to_owned();
             scene.choices.push(Decision {
                 choice: "the seam along the faces of the mesh".to_owned(),
-                why: format!("a rim of its own is refused: {}", refused.message()),
+                why: format!("a rim of its own is refused: {why}"),
             });
+            scene.refused_rim = Some(why);
             scene
         }
     }
@@ -156,25 +165,19 @@ fn with_rim<const D: usize>(
         per_cell: 1,
         within: around(draft, placed, &before),
         has_masses: matches!(draft.solve, Solve::Explicit(_)),
-        has_skin: lays_skin(draft.spec, &before, may_part)
-            .map_err(|what| conflict(what, "use coupling = \"truncated\", or rim = \"mesh\""))?,
+        has_skin: match typed_skin {
+            None => !may_part,
+            Some(skin) => skin == SkinSpec::FreeSurfaces,
+        },
         may_part,
         reach: reach(draft.spec, &before)
             .map_err(|what| conflict(what, "or use rim = \"mesh\""))?,
     };
-    let found = embedded_with_skin(draft, placed, &before, lattice);
-    let (patched, per_cell) = found
-        .map_err(|error| conflict(format!("`zones.rim`: {error}"), "or use rim = \"mesh\""))?;
-    for condition in &draft.conditions {
-        if let Some(what) = conflict_with(condition, draft, &patched) {
-            return Err(conflict(
-                format!("`conditions.{}` {what}", condition.name),
-                "keep the zone, and a rim of a cell around it, away from there, or use rim = \"mesh\"",
-            ));
-        }
-    }
+    let (patched, per_cell, kept_off) =
+        borne(draft, placed, (&before, &lattice)).map_err(|(what, help)| conflict(what, help))?;
     let mut choices = vec![told(&patched, spacing * f64::from(per_cell), why)];
     choices.extend(told_of_skin(patched.skin, typed_skin));
+    choices.extend(told_of_kept_off(patched.kept_off, &kept_off));
     let zone = Placed {
         nonlocal: patched.nonlocal,
         span: (draft.spec.zones.nonlocal.as_ref()).map_or(span, |zone| zone.span()),
@@ -186,6 +189,15 @@ fn with_rim<const D: usize>(
     let draft = draft.on_mesh(patched.mesh, cell_material, before.peridynamics)?;
     let (mut scene, _) = draft.with_coupling(Some(&zone), instead)?;
     scene.choices.extend(choices);
+    if !scene.output.sections.is_empty() {
+        let uncut = Arc::new(UncutBody {
+            mesh: before.mesh,
+            conditions: before.conditions,
+        });
+        for section in &mut scene.output.sections {
+            section.uncut = Some(Arc::clone(&uncut));
+        }
+    }
     let (spec, unused) = (draft.spec, &scene);
     scene.unused = Parts {
         spec,
@@ -193,6 +205,46 @@ fn with_rim<const D: usize>(
     }
     .unused();
     Ok(scene)
+}
+
+/// The mesh with a patch that bears all conditions, the spacings along the edge of its cells, and the conditions that it was kept off; else what stands against it, and a remedy.
+fn borne<const D: usize>(
+    draft: &Draft<'_, D>,
+    placed: Option<&Placed>,
+    (before, lattice): (&Scene<D>, &PatchLattice<D>),
+) -> Result<(Patched<D>, u32, Vec<String>), (String, &'static str)> {
+    let (mut names, mut places) = (Vec::new(), Vec::new());
+    loop {
+        let found = embedded_with_skin(draft, placed, (before, &places), *lattice);
+        let (patched, per_cell) = found.map_err(|error| match (&error, names.first()) {
+            (PatchError::Empty { .. }, Some(name)) => (
+                format!("the rim of the zone would cross a surface that `conditions.{name}` acts on, and the zone is nowhere deeper in the body than its rim and a cell"),
+                "let the zone reach further away from that surface, or use rim = \"mesh\"",
+            ),
+            _ => (format!("`zones.rim`: {error}"), "or use rim = \"mesh\""),
+        })?;
+        let unborne: Vec<_> = (draft.conditions.iter())
+            .filter_map(|condition| Some((condition, conflict_with(condition, draft, &patched)?)))
+            .collect();
+        let known = names.len();
+        for (condition, conflict) in &unborne {
+            if !names.contains(&condition.name) {
+                names.push(condition.name.clone());
+                places.extend(places_of(conflict, &draft.mesh, lattice));
+            }
+        }
+        match unborne.first() {
+            None => return Ok((patched, per_cell, names)),
+            // where it was kept off already, a strip that no element carries lies between
+            Some((condition, conflict)) if names.len() == known => {
+                return Err((
+                    format!("`conditions.{}` {}", condition.name, conflict.what),
+                    "keep the zone, and a rim of a cell around it, away from there, or use rim = \"mesh\"",
+                ));
+            }
+            Some(_) => {}
+        }
+    }
 }
 
 /// Says how large the rim is, and what of the mesh ends at it.
@@ -243,6 +295,17 @@ fn told_of_skin(count: usize, typed: Option<SkinSpec>) -> Option<Decision> {
     })
 }
 
+/// Says which conditions have made elements of cells of the lattice, and of how many.
+fn told_of_kept_off(count: usize, conditions: &[String]) -> Option<Decision> {
+    (count > 0).then(|| Decision {
+        choice: format!(
+            "elements of the mesh in the place of {count} cells of points beside `{}`",
+            conditions.join("`, `")
+        ),
+        why: "a rim across it would have no nodes there".to_owned(),
+    })
+}
+
 /// The cells of the mesh whose horizon and points those of the patch are, where they are not those that the zone holds in the mesh: all of them where a skin would take some, or one that the zone meets which holds no centroid.
 fn met<const D: usize>(draft: &Draft<'_, D>) -> Option<Placed> {
     let (mesh, zone) = (&draft.mesh, draft.spec.zones.nonlocal.as_ref()?);
@@ -278,8 +341,6 @@ fn refuse_others(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
     let zones = &spec.zones;
     let others = [
         ("zones.auto", zones.auto.is_some()),
-        ("output.sections", !spec.output.sections.is_empty()),
-        ("impactors", !spec.impactors.is_empty()),
         ("zones.follow", zones.follow.is_some()),
         ("zones.bodies", !zones.bodies.is_empty()),
     ];
@@ -353,29 +414,11 @@ fn around<const D: usize>(
     mesh.bounds_of(&nodes)
 }
 
-/// Returns true if elements are to lie along the surface of the body: families lack points there, and elements carry all but what may fail.
-fn lays_skin<const D: usize>(
-    spec: &SceneSpec,
-    before: &Scene<D>,
-    may_part: bool,
-) -> Result<bool, String> {
-    let law = before.point_law.linearised();
-    let ends_on_faces = before.coupling.build(law).interface().faces;
-    match spec.zones.skin {
-        None => Ok(ends_on_faces && !may_part),
-        Some(SkinSpec::None) => Ok(false),
-        Some(SkinSpec::FreeSurfaces) if ends_on_faces => Ok(true),
-        Some(SkinSpec::FreeSurfaces) => {
-            Err("a rim of its own lays `zones.skin` for bonds that end on faces alone".to_owned())
-        }
-    }
-}
-
 /// As [`embedded`], without a skin that the scene does not ask for where the zone is nowhere thick enough for one.
 fn embedded_with_skin<const D: usize>(
     draft: &Draft<'_, D>,
     placed: Option<&Placed>,
-    before: &Scene<D>,
+    before: (&Scene<D>, &[Vector<D>]),
     lattice: PatchLattice<D>,
 ) -> Result<(Patched<D>, u32), PatchError> {
     let found = embedded(draft, placed, before, lattice);
@@ -389,11 +432,11 @@ fn embedded_with_skin<const D: usize>(
     embedded(draft, placed, before, without)
 }
 
-/// The mesh with the patch, and how many spacings its cells have along their edges.
+/// The mesh with a patch that is kept off some places, and how many spacings its cells have along their edges.
 fn embedded<const D: usize>(
     draft: &Draft<'_, D>,
     placed: Option<&Placed>,
-    before: &Scene<D>,
+    (before, kept_off): (&Scene<D>, &[Vector<D>]),
     lattice: PatchLattice<D>,
 ) -> Result<(Patched<D>, u32), PatchError> {
     let mesh = &draft.mesh;
@@ -405,27 +448,21 @@ fn embedded<const D: usize>(
         None => (locator.locate(mesh, x, 1e-9))
             .is_some_and(|found| before.zones[found.cell] == Zone::Nonlocal),
     };
-    let mut held = vec![false; mesh.nodes.len()];
-    for support in draft.conditions.iter().filter_map(Condition::support) {
-        match support {
-            Support::Set { nodes, .. } => nodes.iter().for_each(|&n| held[n as usize] = true),
-            Support::Inside(region) => {
-                let inside = region.select_nodes(mesh);
-                held.iter_mut()
-                    .zip(inside)
-                    .for_each(|(held, is)| *held |= is);
-            }
-        }
-    }
+    let supports = HeldPlaces::new(mesh, &draft.conditions, lattice.spacing);
+    let holds = |x: &Vector<D>| supports.holds(mesh, x);
+    let places = Places {
+        is_wanted: &is_wanted,
+        kept_off,
+        is_held: &|n| supports.nodes[n as usize],
+        holds: (!supports.is_empty()).then_some(&holds),
+    };
     let embed = |per_cell: u32| {
         let lattice = PatchLattice {
             per_cell,
             ..lattice
         };
-        patch::embed(mesh, lattice, &is_wanted, &|n| held[n as usize], &|c| {
-            draft.cell_material[c as usize]
-        })
-        .map(|patched| (patched, per_cell))
+        patch::embed(mesh, lattice, places, &|c| draft.cell_material[c as usize])
+            .map(|patched| (patched, per_cell))
     };
     match draft.solve {
         Solve::Explicit(_) => match embed(PER_CELL) {
@@ -451,56 +488,4 @@ fn embedded<const D: usize>(
 fn is_zone_cut<const D: usize>(patched: &Patched<D>) -> bool {
     let mut cut = patched.mesh.embedded.pieces.keys();
     cut.any(|&c| patched.nonlocal[c as usize])
-}
-
-/// The conflict of a condition with a patch that does not bear it, if there is one.
-fn conflict_with<const D: usize>(
-    condition: &Condition<D>,
-    draft: &Draft<'_, D>,
-    patched: &Patched<D>,
-) -> Option<String> {
-    let is_covered = |facet: &&[u32]| {
-        let mut corners = facet_corners::<D>(facet).to_vec();
-        corners.sort_unstable();
-        patched.covered.contains(&corners)
-    };
-    if let Some(load) = condition.load() {
-        let facets = load.on.facets();
-        let set = (patched.torn.iter()).find(|name| {
-            let set = draft.mesh.facet_sets.get(*name);
-            let held = set.into_iter().flatten().map(Vec::as_slice);
-            held.filter(is_covered).any(|facet| facets.contains(&facet))
-        });
-        return set.map(|name| {
-            format!("acts on `{name}`, whose edge divides a face of the zone or its rim")
-        });
-    }
-    if let Some(Support::Set { nodes, facets, .. }) = condition.support() {
-        if facets.is_empty() && nodes.iter().any(|n| patched.dropped.contains(n)) {
-            return Some(
-                "holds nodes that the zone or its rim covers; name a set of facets".to_owned(),
-            );
-        }
-        let crosses = |facet: &[u32]| {
-            let mut corners = facet_corners::<D>(facet).to_vec();
-            corners.sort_unstable();
-            patched.crossed.contains(&corners)
-        };
-        let facet = facets.iter().find(|facet| crosses(facet))?;
-        let x = draft.mesh.bounds_of(facet).0;
-        return Some(format!(
-            "holds a surface at {:?} that crosses elements of the rim, none of whose nodes lies on it",
-            x.as_slice()
-        ));
-    }
-    let facets = condition
-        .term()
-        .map(|term| term.facets())
-        .unwrap_or_default();
-    let facet = facets.iter().find(|facet| is_covered(facet))?;
-    let x = draft.mesh.bounds_of(facet).0;
-    Some(format!(
-        "acts on a facet at {:?}, of which the zone or its rim covers a part",
-        x.as_slice()
-    ))
 }

@@ -1,7 +1,9 @@
 //! Sections through the body: a plane, and the part of the body beyond it.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
+use super::conditions::Condition;
 use super::error::{SceneError, SceneErrorKind};
 use super::places::{extent, inside};
 use super::region::{Region, position};
@@ -22,6 +24,16 @@ pub struct Section<const D: usize> {
     pub inside: Region<D>,
     /// The point about which the moment is taken \[m\].
     pub about: Vector<D>,
+    /// The body with its loads before a patch was embedded in it, where there is one: what acts beyond the plane is the same, and no cell is cut.
+    pub(crate) uncut: Option<Arc<UncutBody<D>>>,
+}
+
+/// A body before a patch was embedded in it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct UncutBody<const D: usize> {
+    pub mesh: Mesh<D>,
+    /// The conditions of the scene, in the same order.
+    pub conditions: Vec<Condition<D>>,
 }
 
 impl<const D: usize> Section<D> {
@@ -77,6 +89,7 @@ fn section<const D: usize>(
             Some(about) => position(&format!("{place}.about"), about)?,
             None => point,
         },
+        uncut: None,
     };
     let beyond = mesh.nodes.iter().filter(|x| section.holds(x)).count();
     if beyond > 0 && beyond < mesh.nodes.len() {

@@ -79,6 +79,8 @@ pub struct Scene<const D: usize> {
     pub output: Output<D>,
     /// The scene to go on with, by another coupling or along other faces, if this one was chosen and turns out not to hold.
     pub(crate) otherwise: Option<Box<Self>>,
+    /// Reason for which the zone has no rim of its own where it would gain by one.
+    pub(crate) refused_rim: Option<String>,
     /// Warnings of parts that touch nothing.
     pub unused: Vec<String>,
     /// A number for the scene's text, by which a checkpoint knows that it belongs to it.

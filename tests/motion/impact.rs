@@ -580,3 +580,34 @@ fn wrong_impactors_say_what_is_wrong() {
         }
     }
 }
+
+/// A body with a round end that is struck there, on a mesh that fits no lattice.
+const LUG: &str = r#"
+kinematics = "plane-strain"
+materials.m.bond-based = { youngs-modulus = 1, density = 1 }
+peridynamics = { horizon = 0.06, points.lattice = { spacing = 0.02, origin = [0.007, 0.003] } }
+zones = { nonlocal.ball = { center = [0.58, 0.05], radius = 0.12 }, skin = "none" }
+conditions.fixed.displacement = { on = "fixed", x = 0, y = 0 }
+solve.explicit = { duration = 1.2, outputs = 0 }
+output.vtu = false
+[impactors.shot]
+sphere = { center = [0.905, 0.02], radius = 0.3 }
+mass = 0.05
+velocity = { x = -0.02 }
+"#;
+
+#[test]
+fn a_zone_with_a_rim_of_its_own_is_struck_like_points_alone() {
+    let momentum = |coupling: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let mesh = concat!(env!("CARGO_MANIFEST_DIR"), "/../../meshes/lug.msh");
+        let scene = format!("coupling = \"{coupling}\"\nmesh.file.path = \"{mesh}\"\n{LUG}");
+        write(folder.path(), "lug.toml", &scene);
+        run(folder.path(), &["lug.toml"]);
+        let speed = column(&folder.path().join("out/lug_history.csv"), "shot_vx");
+        0.05 * (speed[speed.len() - 1] + 0.02)
+    };
+    let (coupled, points) = (momentum("truncated"), momentum("nonlocal"));
+    println!("{coupled:e} {points:e}");
+    assert!((coupled / points - 1.0).abs() < 5e-3, "{coupled} {points}");
+}

@@ -71,15 +71,6 @@ fn a_zone_without_cells() {
 }
 
 #[test]
-fn springs_on_what_the_patch_covers() {
-    let scene = plate()
-        .nonlocal(Region::cuboid([12.0, 7.0], [20.0, 13.0]))
-        .set("conditions.held.spring.on", "right")
-        .set("conditions.held.spring.x", 1.0);
-    refused(&scene, &["`conditions.held`", "covers a part"]);
-}
-
-#[test]
 fn two_materials_in_the_patch() {
     let half = Region::cuboid([0.0, 0.0], [10.0, 20.0]);
     let scene = plate().material("left", Material::bond_based(2.0).cells(half));

@@ -12,6 +12,7 @@ mod quadrilaterals;
 mod shown;
 mod skin;
 mod structure;
+mod supports;
 mod surfaces;
 
 use meshes::{Body, Random};

@@ -1,7 +1,9 @@
 //! Sizes of sites, and how far their points lie below the surface.
 
+use rustc_hash::FxHashSet;
+
 use crate::mesh::facet_corners;
-use crate::model::{Bins, Model, PointSource};
+use crate::model::{Bins, Model, PointSource, SiteKind};
 use crate::shape::{Shape, distance_to_segment};
 use crate::tensor::Vector;
 
@@ -57,35 +59,49 @@ fn shortest_edge<const D: usize>(model: &Model<D>, site: usize) -> f64 {
 /// Nearer to the surface than this part of its size, a point is one of the first layer.
 const FIRST_LAYER: f64 = 1.0 - 1e-6;
 
-/// Returns the distance by which the body extends beyond every site \[m\]: zero at a node. A point of the first layer reaches to the surface of the mesh, any other half of its size.
+/// Returns the distance by which the body extends beyond every site \[m\]: zero at a node, and negative at one of the rim of a zone that lies outside of the body. A point of the first layer reaches to the surface of the mesh, any other half of its size.
 pub(super) fn clearances<const D: usize>(model: &Model<D>, sizes: &[f64]) -> Vec<f64> {
-    let points: Vec<usize> = (0..model.sites.len())
-        .filter(|&s| model.point_of(s).is_some())
-        .collect();
+    let mesh = &model.mesh;
+    let mut of_cut: FxHashSet<u32> = FxHashSet::default();
+    for &c in mesh.embedded.pieces.keys() {
+        of_cut.extend(mesh.cell(c as usize));
+    }
+    let is_asked = |site: &usize| match model.sites[*site].kind {
+        SiteKind::Node(n) => of_cut.contains(&n),
+        _ => model.point_of(*site).is_some(),
+    };
+    let asked: Vec<usize> = (0..model.sites.len()).filter(is_asked).collect();
     let mut clearance = vec![0.0; model.sites.len()];
-    if points.is_empty() {
+    if asked.is_empty() {
         return clearance;
     }
-    let positions: Vec<Vector<D>> = points.iter().map(|&s| model.sites[s].position).collect();
-    let largest = points.iter().map(|&s| sizes[s]).fold(0.0, f64::max);
-    let mut depth = vec![f64::INFINITY; points.len()];
+    let positions: Vec<Vector<D>> = asked.iter().map(|&s| model.sites[s].position).collect();
+    let largest = asked.iter().map(|&s| sizes[s]).fold(0.0, f64::max);
+    // the nearest facet, and whether the place lies beyond it
+    let mut nearest = vec![(f64::INFINITY, false); asked.len()];
     let bins = Bins::new(&positions, largest);
-    for facet in model.mesh.outer_facets() {
+    for facet in mesh.outer_facets() {
         let corners: Vec<Vector<D>> = facet_corners::<D>(&facet.nodes)
             .iter()
-            .map(|&n| model.mesh.nodes[n as usize])
+            .map(|&n| mesh.nodes[n as usize])
             .collect();
         let middle = corners.iter().sum::<Vector<D>>() / corners.len() as f64;
         let radius = corners.iter().map(|x| (x - middle).norm());
         let radius = radius.fold(0.0, f64::max) + largest;
+        let normal = mesh.facet_normal_area(&facet);
         for k in bins.around(&middle, radius) {
-            depth[k] = depth[k].min(distance(&corners, &positions[k]));
+            let d = distance(&corners, &positions[k]);
+            if d < nearest[k].0 {
+                nearest[k] = (d, (positions[k] - middle).dot(&normal) > 0.0);
+            }
         }
     }
-    for (&site, depth) in points.iter().zip(depth) {
-        clearance[site] = match depth < FIRST_LAYER * sizes[site] {
-            true => depth,
-            false => 0.5 * sizes[site],
+    for (&site, (d, is_beyond)) in asked.iter().zip(nearest) {
+        clearance[site] = match model.point_of(site) {
+            Some(_) if d < FIRST_LAYER * sizes[site] => d,
+            Some(_) => 0.5 * sizes[site],
+            None if is_beyond => -d,
+            None => 0.0,
         };
     }
     clearance

@@ -253,7 +253,8 @@ fn places<const D: usize>(
     spacing: f64,
 ) -> Vec<(Vector<D>, Vec<f64>)> {
     let x = |k: usize| mesh.nodes[face.nodes[k] as usize];
-    let parts = |a: usize, b: usize| ((x(b) - x(a)).norm() / spacing).round().max(1.0) as usize;
+    let parts =
+        |a: usize, b: usize| ((x(b) - x(a)).norm() / spacing * 2.0).round().max(1.0) as usize;
     let shapes: Vec<Vec<f64>> = match face.nodes.len() {
         1 => vec![vec![1.0]],
         2 => {

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::error::PatchError;
+use super::{error::PatchError, places::Places};
 use crate::{
     mesh::Mesh,
     model::simplex::{Cells, Simplex, simplices_of},
@@ -36,6 +36,10 @@ pub(super) struct PatchCells<const D: usize> {
     pub held: BTreeMap<Index<D>, Vec<(u32, f64)>>,
     /// Cells that were wanted and are not of the zone, since the surface of the body is near.
     pub skin: usize,
+    /// Cells that were wanted and are not of the zone, since elements are to lie there.
+    pub kept_off: usize,
+    /// Nodes whose displacement is prescribed: they follow nothing, and none of Γ carries a multiplier of its own.
+    prescribed: BTreeSet<Index<D>>,
     /// Corners of the box of cells of which [`PatchCells::held`] is known.
     limits: (Index<D>, Index<D>),
     /// True as long as no cell beyond was asked for.
@@ -76,13 +80,13 @@ impl<const D: usize> Face<D> {
 }
 
 impl<const D: usize> PatchCells<D> {
-    /// The cells whose centre is wanted and lies between two corners, and a rim of so many cells around them; with a skin those alone whose rim is whole.
+    /// The cells whose centre is wanted and lies between two corners, and a rim of so many cells around them; with a skin those alone whose rim is whole, and none whose rim would not leave a cell of elements at places that it is kept off.
     pub fn new(
         mesh: &Mesh<D>,
         cells: Cells<D>,
         (width, has_skin): (i32, bool),
         (low, high): (Vector<D>, Vector<D>),
-        is_wanted: &(dyn Fn(&Vector<D>) -> bool + Sync),
+        places: &Places<'_, D>,
     ) -> Result<Self, PatchError> {
         let (from, to) = cells.range(&low, &high);
         let count: f64 = (0..D)
@@ -92,21 +96,7 @@ impl<const D: usize> PatchCells<D> {
             let edge = cells.spacing;
             return Err(PatchError::Large { count, edge });
         }
-        let wanted: BTreeSet<Index<D>> = parallel::map(
-            (to[0] - from[0] + 1).max(0) as usize,
-            1,
-            |k| -> Vec<Index<D>> {
-                let (mut low, mut high) = (from, to);
-                low[0] += k as i32;
-                high[0] = low[0];
-                block(low, high)
-                    .filter(|index| is_wanted(&cells.centre(index)))
-                    .collect()
-            },
-        )
-        .into_iter()
-        .flatten()
-        .collect();
+        let wanted = wanted(&cells, (from, to), places);
         let empty = PatchError::Empty {
             edge: cells.spacing,
         };
@@ -124,6 +114,8 @@ impl<const D: usize> PatchCells<D> {
             all: BTreeSet::new(),
             held,
             skin: 0,
+            kept_off: 0,
+            prescribed: BTreeSet::new(),
             limits,
             is_known: true,
         };
@@ -139,9 +131,15 @@ impl<const D: usize> PatchCells<D> {
             patch.zone = inner.copied().collect();
             patch.skin = all - patch.zone.len();
         }
+        let off = places.kept_off.iter().map(|x| patch.cells.index(x));
+        let beside = grown(off.collect(), width + 1, limits);
+        let all = patch.zone.len();
+        patch.zone.retain(|index| !beside.contains(index));
+        patch.kept_off = all - patch.zone.len();
         if patch.zone.is_empty() {
             return Err(empty);
         }
+        patch.prescribe(places);
         for index in patch.zone.clone() {
             for other in block(index.map(|i| i - width), index.map(|i| i + width)) {
                 patch.add(other);
@@ -152,6 +150,17 @@ impl<const D: usize> PatchCells<D> {
             true => Ok(patch),
             false => Err(PatchError::Grown),
         }
+    }
+
+    /// Notes the nodes whose displacement is prescribed.
+    fn prescribe(&mut self, places: &Places<'_, D>) {
+        let Some(holds) = places.holds else { return };
+        let cells = self.held.keys();
+        let nodes = cells.flat_map(|cell| block(*cell, cell.map(|i| i + 1)));
+        let nodes: BTreeSet<Index<D>> = nodes.collect();
+        self.prescribed = (nodes.into_iter())
+            .filter(|node| holds(&self.node(node)))
+            .collect();
     }
 
     /// Refuses a patch whose cells hold several materials.
@@ -256,6 +265,11 @@ impl<const D: usize> PatchCells<D> {
         !around.any(|cell| self.is_rim(&cell) && self.part(&cell) >= GOOD)
     }
 
+    /// Returns true if a node of Γ may follow the mesh.
+    fn may_follow(&self, node: &Index<D>) -> bool {
+        !self.is_bad(node) && !self.prescribed.contains(node)
+    }
+
     /// The faces between the patch and the body beyond it.
     pub fn faces(&self) -> Vec<Face<D>> {
         let mut faces = self.outer_faces();
@@ -304,7 +318,7 @@ impl<const D: usize> PatchCells<D> {
                 let mut of_part = around[*node]
                     .iter()
                     .filter(|f| faces[**f].axis == axes[*node]);
-                !self.is_bad(node) && of_part.all(|f| self.kept(&faces[*f], &axes).count() > 1)
+                self.may_follow(node) && of_part.all(|f| self.kept(&faces[*f], &axes).count() > 1)
             });
             if let Some(node) = free.next() {
                 axes.insert(*node, face.axis);
@@ -319,7 +333,7 @@ impl<const D: usize> PatchCells<D> {
         face: &Face<D>,
         axes: &BTreeMap<Index<D>, usize>,
     ) -> impl Iterator<Item = usize> {
-        let is_kept = |node: &Index<D>| axes[node] == face.axis && !self.is_bad(node);
+        let is_kept = |node: &Index<D>| axes[node] == face.axis && self.may_follow(node);
         let nodes = face.nodes();
         let kept: Vec<usize> = (0..nodes.len()).filter(|&i| is_kept(&nodes[i])).collect();
         kept.into_iter()
@@ -419,6 +433,47 @@ pub(super) fn block<const D: usize>(
             from[i] + k as i32
         })
     })
+}
+
+/// The cells from one corner to another whose centre is wanted.
+fn wanted<const D: usize>(
+    cells: &Cells<D>,
+    (from, to): (Index<D>, Index<D>),
+    places: &Places<'_, D>,
+) -> BTreeSet<Index<D>> {
+    let layers = (to[0] - from[0] + 1).max(0) as usize;
+    let of_layer = |k: usize| -> Vec<Index<D>> {
+        let (mut low, mut high) = (from, to);
+        low[0] += k as i32;
+        high[0] = low[0];
+        let all = block(low, high);
+        all.filter(|index| (places.is_wanted)(&cells.centre(index)))
+            .collect()
+    };
+    parallel::map(layers, 1, of_layer)
+        .concat()
+        .into_iter()
+        .collect()
+}
+
+/// Cells with all around them up to a number of cells along each axis, of those between two corners.
+fn grown<const D: usize>(
+    mut cells: BTreeSet<Index<D>>,
+    by: i32,
+    (low, high): (Index<D>, Index<D>),
+) -> BTreeSet<Index<D>> {
+    for axis in 0..D {
+        let along = |index: &Index<D>| {
+            let (from, to) = (index[axis] - by, index[axis] + by);
+            let mut index = *index;
+            (from.max(low[axis])..=to.min(high[axis])).map(move |i| {
+                index[axis] = i;
+                index
+            })
+        };
+        cells = cells.iter().flat_map(along).collect();
+    }
+    cells
 }
 
 /// The corners of the box around cells.

@@ -44,6 +44,8 @@ pub struct Patched<const D: usize> {
     pub rim: usize,
     /// Cells of the lattice in the zone that are elements, since the surface of the body is near.
     pub skin: usize,
+    /// Cells of the lattice in the zone that are elements, since the rim was kept off places near.
+    pub kept_off: usize,
     /// Cells that were replaced before the patch cut them.
     pub replaced: Replaced,
 }
@@ -126,6 +128,7 @@ impl<'s, const D: usize> Composite<'s, D> {
             patched: Patched {
                 rim: patch.all.len() - patch.zone.len(),
                 skin: 0,
+                kept_off: 0,
                 replaced: Replaced::default(),
                 mesh,
                 nonlocal,

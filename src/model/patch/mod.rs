@@ -2,6 +2,7 @@
 //!
 //! | file | content |
 //! |---|---|
+//! | `places.rs` | places that a scene wants, holds, and keeps a patch off |
 //! | `cells.rs` | cells of the zone, the rim around them, and the faces Γ of the rim |
 //! | `replaced.rs` | cells of second order that the patch meets, linear with straight sides; quadrilaterals and hexahedra that it cuts, divided |
 //! | `cuts.rs` | elements that Γ cuts: what is left of them |
@@ -31,13 +32,16 @@ mod error;
 mod followers;
 mod left;
 mod moments;
+mod places;
 mod replaced;
 mod rows;
 mod sides;
 mod surface;
 mod tie;
 
-pub use self::{composite::Patched, error::PatchError, left::Left, replaced::Replaced};
+pub use self::{
+    composite::Patched, error::PatchError, left::Left, places::Places, replaced::Replaced,
+};
 
 use std::collections::BTreeMap;
 
@@ -78,17 +82,16 @@ impl<const D: usize> PatchLattice<D> {
     }
 }
 
-/// Embeds a patch in a mesh: the cells of the lattice with their centre in the zone, `is_wanted`, and a rim around them.
+/// Embeds a patch in a mesh: the cells of the lattice with their centre in the zone, and a rim around them.
 ///
-/// Nodes that `is_held` names have a prescribed motion and follow none; `material` gives the number of a cell's material.
+/// `material` gives the number of a cell's material.
 ///
 /// # Errors
 /// [`PatchError`], each with place and remedy.
 pub fn embed<const D: usize>(
     mesh: &Mesh<D>,
     lattice: PatchLattice<D>,
-    is_wanted: &(dyn Fn(&Vector<D>) -> bool + Sync),
-    is_held: &dyn Fn(u32) -> bool,
+    places: Places<'_, D>,
     material: &dyn Fn(u32) -> u16,
 ) -> Result<Patched<D>, PatchError> {
     let cells = lattice.cells(&mesh.bounds().0);
@@ -98,8 +101,9 @@ pub fn embed<const D: usize>(
         cells,
         (width, lattice.has_skin),
         lattice.within,
-        is_wanted,
+        &places,
     )?;
+    let is_held = places.is_held;
     for _ in 0..ABSORBED {
         patch.check_materials(material)?;
         patch.check_connected(mesh)?;
@@ -157,10 +161,14 @@ fn embedded<const D: usize>(
     }
     Ok(Patched {
         skin: patch.skin,
+        kept_off: patch.kept_off,
         replaced,
         ..patched
     })
 }
+
+/// Part of a cell of the rim up to which a volume is none: what rounding leaves of it.
+const LIGHT: f64 = 1e-9;
 
 /// A node of elements that follows none and has no positive volume, if there is one, where nodes that follow hand theirs on by these rows.
 fn lightest<const D: usize>(
@@ -180,5 +188,6 @@ fn lightest<const D: usize>(
         .filter(|n| !follows(n));
     let least = free.min_by(|&&a, &&b| volume[a as usize].total_cmp(&volume[b as usize]))?;
     let own = volume[*least as usize];
-    (own <= 0.0).then_some((*least, own))
+    let cell = mesh.embedded.covered.edge.powi(D as i32);
+    (own <= LIGHT * cell).then_some((*least, own))
 }

@@ -10,16 +10,13 @@ use super::{
     moments::PartMoments,
 };
 use crate::{
-    mesh::{Mesh, boundary::BoundaryFacet, facet_corners},
+    mesh::{IN_PLANE, Mesh, boundary::BoundaryFacet, facet_corners},
     model::simplex::{Simplex, around_middle, facet_simplices},
     tensor::Vector,
 };
 
 /// Distance into the body, in edges of a cell, at which facets in planes between cells are divided among these.
 const INWARDS: f64 = 1e-3;
-
-/// Distance from a plane between cells within which a facet lies in it, in edges.
-const IN_PLANE: f64 = 1e-7;
 
 /// Size of a part, over that of a face of a cell, below which it has no normal.
 const SLIVER: f64 = 1e-13;

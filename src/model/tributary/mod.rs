@@ -125,10 +125,13 @@ impl<const D: usize> Model<D> {
             }
         }
         if !self.has_energy && self.body().is_some() {
+            let nothing = NOTHING * self.spacing().powi(D as i32);
             let factor = |(own, volume): (f64, &f64)| {
                 let ratio = volume / own;
                 match ratio.is_finite() && ratio > LEAST_SCALE {
                     true if (ratio - 1.0).abs() <= 1e-11 => 1.0,
+                    // a node of which others that follow it have all, but for rounding
+                    _ if own.abs() <= nothing => 1.0,
                     true => ratio,
                     // an equation that next to nothing of the body belongs to stays one
                     false => LEAST_SCALE,
@@ -239,6 +242,9 @@ const ON_NODE: f64 = 1e-9;
 
 /// Distance around the zone to which its lattice is continued, in spacings: farther than weights reach.
 const NEAR: f64 = 4.0;
+
+/// Part of a lattice cell below which a volume is what rounding leaves of none.
+const NOTHING: f64 = 1e-10;
 
 /// The least factor of a row: a site whose part nearly vanishes keeps an equation.
 const LEAST_SCALE: f64 = 1e-3;

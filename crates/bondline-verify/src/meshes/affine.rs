@@ -24,21 +24,26 @@ const GRADIENT: [[f64; 3]; 3] = [
 
 /// A mesh as a file, and a box in its middle that elements enclose.
 #[derive(Clone)]
-struct Family {
-    name: &'static str,
-    kinematics: &'static str,
-    mesh: String,
+pub(super) struct Family {
+    pub name: &'static str,
+    pub kinematics: &'static str,
+    /// Name of the file.
+    pub file: &'static str,
+    /// Its text.
+    pub mesh: String,
     /// Side of the typical element.
-    size: f64,
+    pub size: f64,
+    /// Lowest and highest corner of the body, about.
+    pub extent: [[f64; 3]; 2],
     /// The zone: lowest and highest corner.
-    zone: [[f64; 3]; 2],
+    pub zone: [[f64; 3]; 2],
     /// Part of the boundary on which displacements are prescribed.
-    boundary: &'static str,
+    pub boundary: &'static str,
     /// Width of the transition zone.
-    around: f64,
+    pub around: f64,
 }
 
-/// Twelve by twelve cells, moved by `place`.
+/// Cells of a square, `cells` along each side, moved by `place`.
 fn plane(name: &'static str, cells: usize, place: impl Fn(f64, f64) -> [f64; 2]) -> Family {
     let n = cells + 1;
     let nodes = (0..n * n)
@@ -56,10 +61,40 @@ fn plane(name: &'static str, cells: usize, place: impl Fn(f64, f64) -> [f64; 2])
             &(0..cells * cells).map(cell).collect::<Vec<_>>(),
         ),
         size: 1.0,
+        file: "m.msh",
+        extent: [[0.0; 3], [cells as f64, cells as f64, 0.0]],
         zone: [[4.5, 4.5, 0.0], [7.5, 7.5, 0.0]],
         boundary: "on = \"outer\"",
         around: 1.0,
     }
+}
+
+/// Quadrilaterals whose inner nodes are moved by up to a fifth of a side.
+pub(super) fn jittered(cells: usize) -> Family {
+    let inner = |x: f64| x > 0.5 && x < cells as f64 - 0.5;
+    plane("jittered", cells, |x, y| {
+        let by = |a: f64, b: f64| match inner(x) && inner(y) {
+            true => 0.2 * noise(a, b),
+            false => 0.0,
+        };
+        [x + by(x, y), y + by(y + 3.0, x)]
+    })
+}
+
+/// Tetrahedra between surfaces that are bent.
+pub(super) fn lug(cells: usize) -> Family {
+    solid("tets of a lug", Split::Tets, cells, |x, y, z| {
+        let a = 0.05 * (x - 5.0);
+        [x + 0.3 * (0.5 * y).sin(), y + 5.0 * a * a, z]
+    })
+}
+
+/// Hexahedra of a bar in the shape of an arc.
+pub(super) fn bent_bar(cells: usize) -> Family {
+    solid("hexes of a bent bar", Split::Hexes, cells, |x, y, z| {
+        let (r, a) = (12.0 + y, 0.06 * (x - 5.0));
+        [r * a.sin() + 5.0, r * a.cos() - 12.0, z]
+    })
 }
 
 /// A number in [−1, 1) for a node.
@@ -69,12 +104,7 @@ fn noise(x: f64, y: f64) -> f64 {
 }
 
 /// The families of meshes.
-fn families() -> Vec<Family> {
-    let inner = |x: f64| x > 0.5 && x < 11.5;
-    let bent = |x: f64, y: f64, z: f64| {
-        let (r, a) = (12.0 + y, 0.06 * (x - 5.0));
-        [r * a.sin() + 5.0, r * a.cos() - 12.0, z]
-    };
+pub(super) fn families() -> Vec<Family> {
     vec![
         plane("matching", 12, |x, y| [x, y]),
         plane("coarser", 12, |x, y| [1.3 * x - 1.8, 1.3 * y - 1.8]),
@@ -82,28 +112,14 @@ fn families() -> Vec<Family> {
             let grade = |t: f64| t + 0.02 * t * (t - 12.0);
             [grade(x), grade(y)]
         }),
-        plane("jittered", 12, |x, y| {
-            let by = |a: f64, b: f64| {
-                if inner(a) && inner(b) {
-                    0.2 * noise(a, b)
-                } else {
-                    0.0
-                }
-            };
-            [
-                x + by(x, y),
-                y + if inner(x) && inner(y) {
-                    0.2 * noise(y + 3.0, x)
-                } else {
-                    0.0
-                },
-            ]
-        }),
+        jittered(12),
         Family {
             name: "Delaunay triangles",
             kinematics: "plane-stress",
             mesh: include_str!("../../../../meshes/graded_triangles.msh").to_owned(),
             size: 1.0,
+            file: "m.msh",
+            extent: [[0.0; 3], [20.0, 20.0, 0.0]],
             zone: [[8.0, 8.0, 0.0], [12.0, 12.0, 0.0]],
             boundary: "inside = { without = { from = { everywhere = true }, removed = { box = { min = [0.01, 0.01], max = [19.99, 19.99] } } } }",
             around: 3.0,
@@ -112,11 +128,8 @@ fn families() -> Vec<Family> {
             let (r, a) = (6.0 + x, 0.09 * (y - 6.0));
             [r * a.cos() - 6.0, r * a.sin() + 6.0]
         }),
-        solid("tets of a lug", Split::Tets, |x, y, z| {
-            let a = 0.05 * (x - 5.0);
-            [x + 0.3 * (0.5 * y).sin(), y + 5.0 * a * a, z]
-        }),
-        solid("hexes of a bent bar", Split::Hexes, bent),
+        lug(8),
+        bent_bar(8),
     ]
 }
 
@@ -126,17 +139,21 @@ enum Split {
     Tets,
 }
 
-/// Eight by eight by eight cells of a block with sides of 10, moved by `place`.
-fn solid(name: &'static str, split: Split, place: impl Fn(f64, f64, f64) -> [f64; 3]) -> Family {
-    const CELLS: usize = 8;
-    let n = CELLS + 1;
-    let step = 10.0 / CELLS as f64;
+/// Cells of a block with sides of 1.25, `cells` along each side, moved by `place`.
+fn solid(
+    name: &'static str,
+    split: Split,
+    cells: usize,
+    place: impl Fn(f64, f64, f64) -> [f64; 3],
+) -> Family {
+    let n = cells + 1;
+    let step = 1.25;
     let nodes = (0..n * n * n).map(|k| {
         let at = |i: usize| step * i as f64;
         place(at(k % n), at(k / n % n), at(k / n / n))
     });
-    let cells = (0..CELLS * CELLS * CELLS).flat_map(|c| {
-        let (i, j, k) = (c % CELLS, c / CELLS % CELLS, c / CELLS / CELLS);
+    let list = (0..cells * cells * cells).flat_map(|c| {
+        let (i, j, k) = (c % cells, c / cells % cells, c / cells / cells);
         let at = |a: usize, b: usize, d: usize| i + a + (j + b) * n + (k + d) * n * n;
         let hex = vec![
             at(0, 0, 0),
@@ -159,8 +176,10 @@ fn solid(name: &'static str, split: Split, place: impl Fn(f64, f64, f64) -> [f64
     Family {
         name,
         kinematics: "solid",
-        mesh: gmsh(nodes.collect(), &cells.collect::<Vec<_>>()),
+        mesh: gmsh(nodes.collect(), &list.collect::<Vec<_>>()),
         size: step,
+        file: "m.msh",
+        extent: [[0.0; 3], [step * cells as f64; 3]],
         zone: [[3.5, 3.5, 3.5], [6.5, 6.5, 6.5]],
         boundary: "on = \"outer\"",
         around: step,
@@ -219,6 +238,24 @@ const LAWS: [(&str, &str); 3] = [
     ("LPS, 0.2", "lps]\nyoungs-modulus = 7\npoisson-ratio = 0.2"),
 ];
 
+/// The field as components of a condition.
+pub(super) fn field_text(dimensions: usize) -> String {
+    let axes = ["x", "y", "z"];
+    let component = |i: usize| {
+        let terms = (0..dimensions).map(|j| format!("({:e})*{}", GRADIENT[i][j], axes[j]));
+        let terms: Vec<String> = terms.collect();
+        format!("{} = \"{}\"\n", axes[i], terms.join(" + "))
+    };
+    (0..dimensions).map(component).collect()
+}
+
+/// The displacement of the field at a place.
+pub(super) fn field(position: &[f64]) -> Vec<f64> {
+    let d = position.len();
+    let component = |i: usize| (0..d).map(|j| GRADIENT[i][j] * position[j]).sum();
+    (0..d).map(component).collect()
+}
+
 /// The scene of one case.
 fn text(
     family: &Family,
@@ -236,17 +273,10 @@ fn text(
     } else {
         String::new()
     };
-    let axes = ["x", "y", "z"];
-    let mut field = String::new();
-    for i in 0..dimensions {
-        let terms: Vec<String> = (0..dimensions)
-            .map(|j| format!("({:e})*{}", GRADIENT[i][j], axes[j]))
-            .collect();
-        field += &format!("{} = \"{}\"\n", axes[i], terms.join(" + "));
-    }
     let held = format!(
-        "[conditions.all.displacement]\n{}\n{field}",
-        family.boundary
+        "[conditions.all.displacement]\n{}\n{}",
+        family.boundary,
+        field_text(dimensions)
     );
     format!(
         "kinematics = \"{}\"\n[mesh.file]\npath = \"m.msh\"\n[materials.m.{law}\n[peridynamics]\nhorizon = {}\npoints.lattice = {{ spacing = {h} }}\n[zones.nonlocal]\nbox = {{ min = {}, max = {} }}\n{transition}{coupling}\n{held}[solver]\ntolerance = 1e-12\n",
@@ -280,10 +310,8 @@ fn row(
         Ok((summary, sites)) => {
             let (mut error, mut largest) = (0.0f64, 0.0f64);
             for site in &sites {
-                let d = site.position.len();
-                for i in 0..d {
-                    let exact: f64 = (0..d).map(|j| GRADIENT[i][j] * site.position[j]).sum();
-                    error = error.max((site.displacement[i] - exact).abs());
+                for (u, exact) in site.displacement.iter().zip(field(&site.position)) {
+                    error = error.max((u - exact).abs());
                     largest = largest.max(exact.abs());
                 }
             }
