@@ -93,7 +93,7 @@ fn a_plastic_body_is_in_equilibrium_and_keeps_its_energy() {
 /// A struck square: no mode grows, which the run proves, and it goes on from a checkpoint with the same bytes.
 #[test]
 fn a_struck_square_keeps_its_energy_and_goes_on_from_a_checkpoint() {
-    let struck = "[initial.struck.velocity]\ninside.box = { min = [-1, -1], max = [4, 21] }\nx = 0.3\n[solve.explicit]\nduration = 0.5\noutputs = 2\nhistory-interval = 0.02\ncheckpoint-every = 5\n";
+    let struck = "[initial.struck.velocity]\ninside.box = { min = [-1, -1], max = [4, 21] }\nx = 0.3\n[solve.explicit]\nduration = 0.5\noutputs = 2\nhistory-interval = 0.02\ncheckpoint-every = 5\nstep-fraction = 0.5\n";
     let typed = plastic(struck);
     let folder = folder_with_mesh();
     let said = ran(folder.path(), &typed);
@@ -104,6 +104,7 @@ fn a_struck_square_keeps_its_energy_and_goes_on_from_a_checkpoint() {
     let given = kinetic[0];
     for k in 0..stored.len() {
         let missing = (stored[k] + kinetic[k] + gone[k] - given) / given;
+        // of second order in the step: 6.5e-3 at 0.95 of the stable one, 4e-4 at 0.25
         assert!(missing.abs() < 3e-3, "{k}: {missing:e}");
     }
     assert!(*gone.last().unwrap() > 1e-3 * given);
