@@ -30,6 +30,8 @@ impl Cuts {
     pub fn new<const D: usize>(mesh: &Mesh<D>, patch: &PatchCells<D>) -> Result<Self, PatchError> {
         let mut met: Vec<u32> = (patch.all.iter())
             .flat_map(|index| patch.held[index].iter().map(|part| part.0))
+            // also what is divided since it touches the patch
+            .chain(mesh.embedded.divided.iter().copied())
             .collect();
         met.sort_unstable();
         met.dedup();
@@ -41,7 +43,7 @@ impl Cuts {
             if size <= NOTHING * whole {
                 return Ok(Some((met[k], None)));
             }
-            if inside <= NOTHING * whole {
+            if inside <= NOTHING * whole && !mesh.embedded.is_divided(c) {
                 return Ok(None);
             }
             let central: Vec<_> = outside.iter().map(PartMoments::central).collect();

@@ -8,7 +8,7 @@ use super::{
     cells::PatchCells,
     cuts::{NOTHING, has_constant_jacobian},
 };
-use crate::mesh::{CellShape, Mesh};
+use crate::mesh::{CellShape, IN_PLANE, Mesh};
 
 /// Cells that were replaced.
 #[derive(Clone, Debug, Default)]
@@ -28,11 +28,11 @@ pub(super) fn replaced<'m, const D: usize>(
 ) -> (Cow<'m, Mesh<D>>, Replaced) {
     let mut found = Replaced::default();
     let mut mesh = Cow::Borrowed(mesh);
-    let inside = inside(&mesh, patch);
+    let met = met(&mesh, patch);
     if mesh.has_quadratic_cells() {
-        straighten(mesh.to_mut(), &inside, &mut found);
+        straighten(mesh.to_mut(), &met, &mut found);
     }
-    let divided = to_divide(&mesh, &inside);
+    let divided = to_divide(&mesh, &met);
     if !divided.is_empty() {
         found.divided = divided.len();
         mesh.to_mut().embedded.divided.extend(divided);
@@ -40,21 +40,40 @@ pub(super) fn replaced<'m, const D: usize>(
     (mesh, found)
 }
 
-/// Volume of each cell in the patch, none of those that it does not meet.
-fn inside<const D: usize>(mesh: &Mesh<D>, patch: &PatchCells<D>) -> Vec<Option<f64>> {
-    let mut inside = vec![None; mesh.cell_count()];
+/// A cell that the patch meets.
+#[derive(Clone, Copy, Default)]
+struct Met {
+    /// Its volume in the patch.
+    inside: f64,
+    /// True if a facet of it lies in a face of the patch: its trace there is integrated as that of a cell that is cut.
+    touches: bool,
+}
+
+/// The cells that the patch meets.
+fn met<const D: usize>(mesh: &Mesh<D>, patch: &PatchCells<D>) -> Vec<Option<Met>> {
+    let mut met: Vec<Option<Met>> = vec![None; mesh.cell_count()];
     for index in &patch.all {
         for &(c, volume) in &patch.held[index] {
-            *inside[c as usize].get_or_insert(0.0) += volume;
+            met[c as usize].get_or_insert_default().inside += volume;
         }
     }
-    inside
+    for face in patch.faces() {
+        let plane = patch.node(&face.nodes()[0])[face.axis];
+        let near = IN_PLANE * patch.cells.spacing;
+        for &(c, _) in &patch.held[&face.neighbour()] {
+            let in_plane = |n: &&u32| (mesh.nodes[**n as usize][face.axis] - plane).abs() <= near;
+            if mesh.corners(c as usize).iter().filter(in_plane).count() >= D {
+                met[c as usize].get_or_insert_default().touches = true;
+            }
+        }
+    }
+    met
 }
 
 /// Makes linear cells, of straight sides, of those of second order that the patch meets.
-fn straighten<const D: usize>(mesh: &mut Mesh<D>, inside: &[Option<f64>], found: &mut Replaced) {
+fn straighten<const D: usize>(mesh: &mut Mesh<D>, met: &[Option<Met>], found: &mut Replaced) {
     let is_met: Vec<bool> = (0..mesh.cell_count())
-        .map(|c| inside[c].is_some() && mesh.shapes[c].is_quadratic())
+        .map(|c| met[c].is_some() && mesh.shapes[c].is_quadratic())
         .collect();
     for c in (0..is_met.len()).filter(|&c| is_met[c]) {
         found.linear += 1;
@@ -71,18 +90,19 @@ fn straighten<const D: usize>(mesh: &mut Mesh<D>, inside: &[Option<f64>], found:
     mesh.linearise(|c| is_met[c]);
 }
 
-/// Quadrilaterals and hexahedra to divide: all that the patch cuts, if one of them is neither a parallelogram nor a parallelepiped. Cells that share a cut face have to have the same displacement there.
-fn to_divide<const D: usize>(mesh: &Mesh<D>, inside: &[Option<f64>]) -> Vec<u32> {
+/// Quadrilaterals and hexahedra to divide: all that the patch cuts or touches, if one of them is neither a parallelogram nor a parallelepiped. Cells that share a cut face have to have the same displacement there.
+fn to_divide<const D: usize>(mesh: &Mesh<D>, met: &[Option<Met>]) -> Vec<u32> {
     let is_cut = |c: &u32| {
         let c = *c as usize;
         let is_kind = matches!(mesh.shapes[c], CellShape::Quad4 | CellShape::Hex8);
-        let Some(inside) = inside[c].filter(|_| is_kind) else {
+        let Some(Met { inside, touches }) = met[c].filter(|_| is_kind) else {
             return false;
         };
         let whole = mesh.cell_volume(c).abs();
-        inside.min(whole - inside) > NOTHING * whole
+        let part = whole - inside;
+        part > NOTHING * whole && (touches || inside > NOTHING * whole)
     };
-    let cut: Vec<u32> = (0..inside.len() as u32).filter(is_cut).collect();
+    let cut: Vec<u32> = (0..met.len() as u32).filter(is_cut).collect();
     match cut.iter().all(|&c| has_constant_jacobian(mesh, c as usize)) {
         true => Vec::new(),
         false => cut,
