@@ -246,7 +246,7 @@ fn sums<const D: usize>(body: &PdBody<D>) -> (Vec<Vector<D>>, Vec<bool>) {
     (sums, is_whole)
 }
 
-/// Places on a face about a spacing apart, each with the shape values of the nodes of the element behind it.
+/// Places on a face about half a spacing apart, each with the shape values of the nodes of the element behind it.
 fn places<const D: usize>(
     mesh: &Mesh<D>,
     face: &BoundaryFacet,

@@ -53,7 +53,7 @@ pub(super) fn conflict_with<const D: usize>(
             return Some(Conflict {
                 what: "holds nodes that the zone or its rim covers; name a set of facets"
                     .to_owned(),
-                nodes: nodes.iter().copied().collect(),
+                nodes: nodes.to_vec(),
                 facets: Vec::new(),
             });
         }
