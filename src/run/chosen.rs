@@ -35,7 +35,10 @@ fn with_each<const D: usize, T>(
         });
     };
     // what whoever holds the scene has set since it was read; its layout is its own
+    let sections = std::mem::take(&mut other.output.sections);
     other.output = scene.output.clone();
+    // these know the body before its patch, if it has one
+    other.output.sections = sections;
     other.solve = scene.solve.clone();
     other.solver = scene.solver;
     other.title = scene.title.clone();

@@ -102,7 +102,7 @@ fn zones_keep_off_springs() {
     assert!(says_so(&solution, "bed"));
 }
 
-/// What acts beyond a section is the same with a patch and without.
+/// Loads beyond a section are the same with a patch and without.
 #[test]
 fn sections_through_zone_and_rim_tell_the_load_beyond() {
     let zone = Region::ball([11.0, 12.0], 5.0);

@@ -214,7 +214,7 @@ fn gmsh(nodes: Vec<[f64; 3]>, cells: &[Vec<usize>]) -> String {
 }
 
 /// Couplings by what a scene types, and whether they have a transition zone.
-const COUPLINGS: [(&str, &str, bool); 6] = [
+pub(super) const COUPLINGS: [(&str, &str, bool); 6] = [
     ("truncated", "[coupling.truncated]", false),
     ("splice", "[coupling.splice]", false),
     ("balanced", "[coupling.balanced]", false),
