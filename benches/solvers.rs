@@ -1,5 +1,5 @@
 //! Times the solvers against each other, all within one run, in seconds of CPU (the machine may be shared):
-//! `cargo bench --bench solvers -- [direct|faer|krylov …] [CASE …]`; `-- crossover` direct against Krylov by size; `-- symmetric` a symmetric seam against a splice.
+//! `cargo bench --bench solvers -- [direct|faer|krylov|products …] [CASE …]`; `-- crossover` direct against Krylov by size; `-- symmetric` a symmetric seam against a splice. `products` has the matrix by blocks beside that of sprs.
 
 use bondline::progress::Silent;
 use bondline::solve::direct::{Analysis, DirectParams, Factor};
@@ -115,7 +115,7 @@ fn main() {
         named.is_empty() || named.iter().any(|w| *w == name)
     };
     let names = CASES.map(|(name, _)| name);
-    let solvers = ["direct", "orderings", "faer", "krylov"];
+    let solvers = ["direct", "orderings", "faer", "krylov", "products"];
     for (name, make) in CASES {
         if !asked(name, &names) {
             continue;
@@ -156,6 +156,9 @@ fn main() {
         }
         if asked("faer", &solvers) {
             bench.faer();
+        }
+        if asked("products", &solvers) {
+            bench.products();
         }
     }
 }
@@ -279,6 +282,47 @@ impl Bench<'_> {
             info.cost.bytes as f64 * 1e-9,
             factor.bytes() as f64 * 1e-9,
             peak(),
+        );
+    }
+
+    /// Products with the matrix as it is, by blocks of its own in each row, and by sprs.
+    fn products(&self) {
+        let shared = &self.case.matrix;
+        let mut apart = BlockCsr {
+            block: shared.block,
+            row_offsets: shared.row_offsets.clone(),
+            columns: shared.columns.clone(),
+            ..BlockCsr::default()
+        };
+        for i in 0..shared.rows() {
+            apart.values.extend_from_slice(shared.row(i).1);
+        }
+        let scalar = shared.to_csr();
+        let x = self.load();
+        let mut y = vec![0.0; x.len()];
+        let mut timed = |product: &mut dyn FnMut(&mut [f64])| {
+            let (start, mut runs) = (cpu_seconds(), 0);
+            while cpu_seconds() - start < 0.5 {
+                product(&mut y);
+                runs += 1;
+            }
+            (cpu_seconds() - start) / f64::from(runs)
+        };
+        let by_sprs = timed(&mut |y| {
+            y.fill(0.0);
+            sprs::prod::mul_acc_mat_vec_csr(scalar.view(), &x[..], y);
+        });
+        let by_blocks = timed(&mut |y| apart.multiply_into(&x, y));
+        let as_it_is = timed(&mut |y| shared.multiply_into(&x, y));
+        let bytes = |m: &BlockCsr| 8 * m.values.len() + 4 * m.columns.len();
+        let of_sprs = 16 * scalar.nnz();
+        println!(
+            "  product: sprs {by_sprs:.2e} s, {:.3} GB; blocks {:.2} of that, {:.2} of the memory; as it is {:.2}, {:.2}",
+            of_sprs as f64 * 1e-9,
+            by_blocks / by_sprs,
+            bytes(&apart) as f64 / of_sprs as f64,
+            as_it_is / by_sprs,
+            bytes(shared) as f64 / of_sprs as f64,
         );
     }
 

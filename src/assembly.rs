@@ -1,5 +1,7 @@
 //! Sparse rows: transfer rows that express a place through sites, and the accumulator of one stiffness row.
 
+use sprs::{CompressedStorage, CsMatI};
+
 use crate::{
     parallel,
     system::{BlockCsr, RowBatch, SharedRows},
@@ -10,51 +12,54 @@ use crate::{
 ///
 /// A place that is a site itself has one weight, 1. The weights of every row add up to 1 and reproduce affine fields,
 /// which is what carries a patch test through the seam.
-#[derive(Clone, Debug, Default)]
-pub struct Transfer {
-    offsets: Vec<usize>,
-    sites: Vec<u32>,
-    weights: Vec<f64>,
+///
+/// Shapes: a matrix of places by sites, each row sorted by site; one weight serves all components of a displacement.
+#[derive(Clone, Debug)]
+pub struct Transfer(CsMatI<f64, u32, usize>);
+
+impl Default for Transfer {
+    fn default() -> Self {
+        Self::new(0)
+    }
 }
 
 impl Transfer {
-    /// A transfer without rows.
-    pub fn new() -> Self {
-        Self {
-            offsets: vec![0],
-            ..Self::default()
-        }
+    /// A transfer from so many sites without rows.
+    pub fn new(sites: usize) -> Self {
+        Self(CsMatI::empty(CompressedStorage::CSR, sites))
     }
 
-    /// A transfer from its rows.
-    pub fn from_rows(rows: impl IntoIterator<Item = Vec<(u32, f64)>>) -> Self {
-        let mut transfer = Self::new();
-        for row in rows {
-            transfer.push(row);
-        }
+    /// A transfer from so many sites, by its rows.
+    pub fn from_rows(sites: usize, rows: impl IntoIterator<Item = Vec<(u32, f64)>>) -> Self {
+        let mut transfer = Self::new(sites);
+        rows.into_iter().for_each(|row| transfer.push(row));
         transfer
     }
 
     /// Appends a row; entries for the same site are added, zero weights dropped.
-    pub fn push(&mut self, row: impl IntoIterator<Item = (u32, f64)>) {
-        let start = self.sites.len();
-        for (site, weight) in row.into_iter().filter(|&(_, w)| w != 0.0) {
-            // rows are short, and most come in order
-            let behind = self.sites[start..].iter().rev().take_while(|s| **s > site);
-            let place = self.sites.len() - behind.count();
-            if place > start && self.sites[place - 1] == site {
-                self.weights[place - 1] += weight;
-            } else {
-                self.sites.insert(place, site);
-                self.weights.insert(place, weight);
+    pub fn push(&mut self, mut row: Vec<(u32, f64)>) {
+        row.sort_by_key(|&(site, _)| site);
+        row.dedup_by(|next, sum| {
+            let same = next.0 == sum.0;
+            if same {
+                sum.1 += next.1;
             }
-        }
-        self.offsets.push(self.sites.len());
+            same
+        });
+        // sprs appends to a matrix that it takes and gives back
+        let matrix = std::mem::replace(&mut self.0, CsMatI::empty(CompressedStorage::CSR, 0));
+        let row = row.into_iter().map(|(site, weight)| (site as usize, weight));
+        self.0 = matrix.append_outer_iter(row);
+    }
+
+    /// Number of sites.
+    pub fn sites(&self) -> usize {
+        self.0.cols()
     }
 
     /// Number of places.
     pub fn len(&self) -> usize {
-        self.offsets.len() - 1
+        self.0.rows()
     }
 
     /// Returns true if there is no place.
@@ -62,26 +67,31 @@ impl Transfer {
         self.len() == 0
     }
 
+    /// The matrix, of places by sites.
+    pub fn matrix(&self) -> &CsMatI<f64, u32, usize> {
+        &self.0
+    }
+
+    #[inline]
+    fn entries(&self, place: usize) -> (&[u32], &[f64]) {
+        let range = self.0.indptr().outer_inds_sz(place);
+        (&self.0.indices()[range.clone()], &self.0.data()[range])
+    }
+
     /// Sites and weights of a place; none for a place that no equation uses.
+    #[inline]
     pub fn row(&self, place: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
-        let range = self.offsets[place]..self.offsets[place + 1];
-        self.sites[range.clone()]
-            .iter()
-            .copied()
-            .zip(self.weights[range].iter().copied())
+        let (sites, weights) = self.entries(place);
+        sites.iter().copied().zip(weights.iter().copied())
     }
 
     /// The site that a place is.
     #[inline]
     pub fn site(&self, place: usize) -> Option<u32> {
-        let start = self.offsets[place];
-        let is_site = self.offsets[place + 1] == start + 1 && self.weights[start] == 1.0;
-        is_site.then(|| self.sites[start])
-    }
-
-    /// Number of stored weights.
-    pub fn weight_count(&self) -> usize {
-        self.sites.len()
+        match self.entries(place) {
+            (&[site], &[1.0]) => Some(site),
+            _ => None,
+        }
     }
 
     /// The displacement of a place; `u` holds `D` numbers per site.

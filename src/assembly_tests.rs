@@ -88,7 +88,7 @@ fn the_pattern_is_that_of_the_matrix() {
 
 #[test]
 fn a_place_is_the_sum_of_its_weights() {
-    let transfer = Transfer::from_rows([
+    let transfer = Transfer::from_rows(4, [
         vec![(3, 0.25), (1, 0.5), (3, 0.25), (0, 0.0)],
         vec![],
         vec![(2, 1.0)],
@@ -105,11 +105,18 @@ fn a_place_is_the_sum_of_its_weights() {
         transfer.displacement::<2>(2, &u),
         Vector::<2>::new(5.0, 6.0)
     );
+    // a weight that others cancel is none
+    let cancelled = Transfer::from_rows(2, [vec![(1, 1.0), (0, 0.5), (1, -1.0)]]);
+    assert_eq!(cancelled.row(0).collect::<Vec<_>>(), [(0, 0.5)]);
+    // the product of the matrix
+    let x = sprs::CsVecI::<f64, u32>::new(4, vec![0, 1, 2, 3], u[..4].to_vec());
+    let product = transfer.matrix() * &x;
+    assert_eq!(product.data(), [3.0, 3.0]);
 }
 
 #[test]
 fn rows_are_sorted_summed_and_reused() {
-    let transfer = Transfer::from_rows([vec![(5, 0.5), (1, 0.5)]]);
+    let transfer = Transfer::from_rows(6, [vec![(5, 0.5), (1, 0.5)]]);
     let matrix = assemble::<2>(
         600,
         |_| {},

@@ -120,5 +120,5 @@ pub(crate) fn fit_nodes<const D: usize>(
             found: within(widest).len(),
         })
     })?;
-    Ok(Transfer::from_rows(rows))
+    Ok(Transfer::from_rows(at.sites.len(), rows))
 }

@@ -73,7 +73,7 @@ impl<const D: usize> Model<D> {
         let mut model = Self {
             node_cells: mesh.node_cells(),
             ties: Ties::new(&mesh),
-            node_transfer: Transfer::new(),
+            node_transfer: Transfer::default(),
             mesh,
             zones,
             roles,
@@ -110,7 +110,7 @@ impl<const D: usize> Model<D> {
                 NONE => model.ties.row(n, &node_site).unwrap_or_default(),
                 site => vec![(site, 1.0)],
             });
-            model.node_transfer = Transfer::from_rows(rows);
+            model.node_transfer = Transfer::from_rows(model.sites.len(), rows);
         }
         model.share_out();
         Ok(model)

@@ -81,7 +81,7 @@ fn rows<const D: usize>(
         None => vec![(site(i), 1.0)],
         Some((cell, shape)) => row(mesh, of_node, patches, *cell, shape, &cloud.position[i]),
     });
-    Transfer::from_rows(rows)
+    Transfer::from_rows(of_node.sites(), rows)
 }
 
 /// The row of the place `x` in a cell with these shape values.

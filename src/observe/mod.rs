@@ -13,6 +13,7 @@
 //! | `report.rs` | rows with a verdict, their table for people and their JSON |
 //! | `summary.rs`, `motion_summary.rs` | summary of one run: sizes, choices, timings, balance; energies over time |
 //! | `cracks.rs` | energy and area of broken bonds, in a summary |
+//! | `provenance.rs` | program, scene, machine and times of a run, in a file beside its outputs |
 //! | `proof.rs` | results of the checks of a model before it is solved |
 //! | `rezoning_event.rs` | changes of the nonlocal zone during a run |
 //! | `observer.rs` | results handed to the program that started a run |
@@ -29,6 +30,7 @@ mod motion_summary;
 mod observer;
 pub mod pieces;
 pub mod proof;
+pub mod provenance;
 pub mod report;
 pub mod rezoning_event;
 pub mod series;

@@ -194,6 +194,10 @@ impl SectionForce {
 pub struct RunSummary {
     /// The scene's name or file.
     pub scene: String,
+    /// Version of the program.
+    pub version: &'static str,
+    /// Fingerprint of all of the scene that determines its results, overrides and mesh files included: 16 hexadecimal digits.
+    pub scene_hash: String,
     /// Space dimension.
     pub dimension: usize,
     /// Coupling method, as the scene names it.

@@ -159,6 +159,8 @@ pub struct Snapshot {
     pub cell_fields: Vec<Field>,
     /// Time, if it means anything here.
     pub time: Option<f64>,
+    /// Program and scene that it comes from, for a comment at the head of the file; empty if there is none.
+    pub origin: String,
 }
 
 impl Snapshot {
@@ -339,8 +341,12 @@ pub fn write_vtu(
         };
         writeln!(
             out,
-            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"{compressor}>\n<UnstructuredGrid>"
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"{compressor}>"
         )?;
+        if !snapshot.origin.is_empty() {
+            writeln!(out, "<!-- {} -->", snapshot.origin)?;
+        }
+        writeln!(out, "<UnstructuredGrid>")?;
         if let Some(t) = snapshot.time {
             writeln!(
                 out,

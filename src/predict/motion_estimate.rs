@@ -241,7 +241,7 @@ impl OutputCost {
                 stresses: (&rest.stresses, 0.0),
             };
             let mut series = Series::new(folder.path(), "trial");
-            file_seconds(&solved, rest.output.points, count, |s| {
+            file_seconds(&solved, &rest.output, count, |s| {
                 series.push(0.0, s).map(drop)
             })?
         } else {

@@ -64,7 +64,7 @@ pub(crate) fn made_up(dofs: usize) -> Vec<f64> {
 /// [`ObserveError`] if nothing can be written, as a run would.
 pub(crate) fn file_seconds<const D: usize>(
     solved: &Solved<'_, D>,
-    points: PointOutputSpec,
+    output: &Output<D>,
     files: f64,
     mut write: impl FnMut(Snapshot) -> Result<(), ObserveError>,
 ) -> Result<f64, ObserveError> {
@@ -72,7 +72,7 @@ pub(crate) fn file_seconds<const D: usize>(
     let mut trial = |wanted: f64| -> Result<(f64, f64), ObserveError> {
         let every = (all / wanted).floor().max(1.0);
         let begun = Instant::now();
-        write(snapshot(solved, &[], points, Shown::Every(every as usize)))?;
+        write(snapshot(solved, &[], output, Shown::Every(every as usize)))?;
         Ok((all / every, begun.elapsed().as_secs_f64()))
     };
     // the first of all makes the folder
@@ -103,7 +103,7 @@ pub(crate) fn output_seconds<const D: usize>(
     let mut seconds = 0.0;
     if output.vtu {
         let path = folder.path().join("trial.vtu");
-        seconds += file_seconds(solved, output.points, 1.0, |s| {
+        seconds += file_seconds(solved, output, 1.0, |s| {
             write_vtu(&path, &s, Compression::default())
         })?;
     }

@@ -15,6 +15,7 @@ use super::zone_placement::{self};
 use crate::material::Kinematics;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::pieces::agreed;
+use crate::observe::provenance;
 use crate::observe::summary::{Decision, RunSummary};
 use crate::progress::Progress;
 use crate::scene::draft::Draft;
@@ -215,13 +216,35 @@ impl AnyScene {
             self.fits()?;
         }
         let unused = self.unused().to_vec();
+        let scene_hash = self.scene_hash();
         let mut summary = match self {
             Self::Bar(s) => run(*s, options, progress),
             Self::Plane(s) => run(*s, options, progress),
             Self::Solid(s) => run(*s, options, progress),
         }?;
         summary.warnings.extend(unused);
+        (summary.version, summary.scene_hash) = (provenance::VERSION, scene_hash);
         Ok(summary)
+    }
+
+    /// Fingerprint of all of the scene that determines its results: 16 hexadecimal digits.
+    pub fn scene_hash(&self) -> String {
+        let fingerprint = match self {
+            Self::Bar(s) => &s.fingerprint,
+            Self::Plane(s) => &s.fingerprint,
+            Self::Solid(s) => &s.fingerprint,
+        };
+        provenance::scene_hash(fingerprint.value())
+    }
+
+    /// The file of the [`Provenance`](provenance::Provenance) of a run.
+    pub fn provenance_path(&self) -> PathBuf {
+        let (folder, name) = match self {
+            Self::Bar(s) => (&s.output.directory, &s.output.name),
+            Self::Plane(s) => (&s.output.directory, &s.output.name),
+            Self::Solid(s) => (&s.output.directory, &s.output.name),
+        };
+        folder.join(format!("{name}{}", provenance::PROVENANCE))
     }
 
     /// Warnings of parts of the scene that touch nothing.

@@ -49,7 +49,7 @@ pub(super) fn write_for<const D: usize>(
     let solution = LazyCell::new(|| SampledSolution::new(solved, options.ranks));
     let path = |end: &str| output.directory.join(format!("{}{end}", output.name));
     let whole = path(".vtu");
-    let of = |shown: Shown<'_>| snapshot(solved, &[], output.points, shown);
+    let of = |shown: Shown<'_>| snapshot(solved, &[], output, shown);
     let mut written = None;
     if let Some(ranks) = options.writers().filter(|_| output.vtu) {
         let piece = Piece::new(solved.model, output.points, ranks);
@@ -168,12 +168,13 @@ pub type Remembered<'a> = (&'static str, &'a [f64]);
 pub fn snapshot<const D: usize>(
     solved: &Solved<'_, D>,
     remembered: &[Remembered<'_>],
-    points: PointOutputSpec,
+    output: &Output<D>,
     shown: Shown<'_>,
 ) -> Snapshot {
     let mut rows = SnapshotRows::new(solved);
+    rows.snapshot.origin.clone_from(&output.origin);
     rows.push_elements(shown);
-    rows.push_points(points, shown);
+    rows.push_points(output.points, shown);
     let shared = Shared::of(solved);
     rows.snapshot.point_fields = arrays(solved, &shared, On::Points, &rows.points);
     rows.push_remembered_by_sites(remembered);

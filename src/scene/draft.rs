@@ -34,6 +34,7 @@ use crate::material::Kinematics;
 use crate::mesh::Mesh;
 use crate::model::Zone;
 use crate::observe::checkpoint::Fingerprint;
+use crate::observe::provenance;
 use crate::observe::report::{components, number};
 use crate::observe::summary::Decision;
 use crate::peridynamics::{Influence, Law};
@@ -314,7 +315,8 @@ impl<'a, const D: usize> Draft<'a, D> {
             mesh,
             |c| self.cell_material[c] == used[0],
         )?;
-        let output = output::output(spec, (mesh, self.kinematics), &voids, self.name)?;
+        let mut output = output::output(spec, (mesh, self.kinematics), &voids, self.name)?;
+        output.origin = provenance::origin(self.fingerprint.value());
         let scene = Scene {
             title: spec.title.clone().unwrap_or_else(|| self.name.to_owned()),
             kinematics: self.kinematics,

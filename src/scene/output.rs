@@ -15,6 +15,7 @@ use crate::material::Kinematics;
 use crate::mesh::Mesh;
 use crate::observe::ObserveError;
 use crate::observe::claim::{Claim, Files};
+use crate::observe::provenance::PROVENANCE;
 use crate::shape::Shape;
 
 /// The table of all probes; lines have tables by their own names beside it.
@@ -92,6 +93,7 @@ pub(crate) fn output<const D: usize>(
             .as_ref()
             .map_or("out".into(), |d| d.value.clone().into()),
         name: o.name.as_ref().map_or(name.to_owned(), |n| n.value.clone()),
+        origin: String::new(),
         vtu: o.vtu.unwrap_or(true),
         points: o.points,
         fields: field_choice(o, kinematics),
@@ -164,6 +166,9 @@ impl<const D: usize> Output<D> {
             if !self.sections.is_empty() {
                 ends.push(format!("_{SECTIONS}.csv"));
             }
+        }
+        if !ends.is_empty() {
+            ends.push(PROVENANCE.to_owned());
         }
         Files {
             name: name.clone(),

@@ -141,6 +141,8 @@ pub struct Output<const D: usize> {
     pub directory: PathBuf,
     /// Beginning of all file names.
     pub name: String,
+    /// Program and scene, as files name them: `bondline 0.1.0, scene 0123456789abcdef`.
+    pub origin: String,
     /// True if a VTU is written.
     pub vtu: bool,
     /// Representation of peridynamic points in it.

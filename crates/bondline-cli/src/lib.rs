@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use bondline::observe::checkpoint::Pace;
+use bondline::observe::provenance::Provenance;
 use bondline::observe::report as tables;
 use bondline::observe::summary::Ended;
 use bondline::progress::Silent;
@@ -24,6 +25,12 @@ use command::fields;
 use command::interrupt::{self, INTERRUPTED};
 use command::threads::{self, Oversubscribe};
 use command::verify;
+
+/// Commit that this package was built from, `-modified` where its clone had changes; none where it was not built from a clone.
+pub const COMMIT: Option<&str> = option_env!("BONDLINE_COMMIT");
+
+/// Version, and the commit where it is known.
+const VERSION: &str = env!("BONDLINE_VERSION");
 
 /// Exit status of success.
 const DONE: u8 = 0;
@@ -55,7 +62,7 @@ Examples:
 
 /// Couples classical finite elements to meshfree peridynamics.
 #[derive(Parser)]
-#[command(name = "bondline", version, after_help = EXAMPLES)]
+#[command(name = "bondline", version = VERSION, after_help = EXAMPLES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -347,6 +354,7 @@ fn run(
         observer: None,
         ranks,
     };
+    let provenance = scene.provenance_path();
     let is_first = ranks.is_none_or(|ranks| ranks.rank() == 0);
     let summary = match ranks {
         None => threads::on_one(|| scene.run_with(&options, &TerminalProgress::on_stderr())),
@@ -354,6 +362,11 @@ fn run(
         Some(_) => scene.run_with(&options, &Silent),
     };
     let summary = summary.map_err(|e| miette::miette!("{e}"))?;
+    if is_first && !summary.files.is_empty() {
+        let processes = ranks.map_or(1, Ranks::count);
+        let written = Provenance::new(&summary, COMMIT, processes).write(&provenance);
+        written.map_err(|e| miette::miette!("{e}"))?;
+    }
     let code = match summary.motion.as_ref().map(|m| m.ended) {
         None | Some(Ended::Finished | Ended::Parted) => DONE,
         Some(Ended::DamageAtEdge | Ended::EnergyGained | Ended::ElementsRotated) => AT_EDGE,

@@ -28,7 +28,7 @@ impl TangentPattern {
                 }
             }
         }
-        let rows_of_node = Transfer::from_rows(takers);
+        let rows_of_node = Transfer::from_rows(model.sites.len(), takers);
         let mut rows = vec![Vec::new(); model.sites.len()];
         for cell in elements.cells() {
             let nodes = model.mesh.cell(cell);

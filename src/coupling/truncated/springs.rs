@@ -94,7 +94,7 @@ impl<const D: usize> Springs<D> {
         let mut springs = Self {
             direction: Vec::new(),
             stiffness: Vec::new(),
-            difference: Transfer::new(),
+            difference: Transfer::new(segments.model.sites.len()),
             of_site: BySite::default(),
             origin: Vec::new(),
         };
@@ -107,7 +107,7 @@ impl<const D: usize> Springs<D> {
             springs.stiffness.push(
                 s.stiffness * s.piece.share * s.scale / length * segments.of_materials(s.i, s.j),
             );
-            springs.difference.push(segments.difference(s));
+            springs.difference.push(segments.difference(s).collect());
             springs.origin.push(Origin {
                 bond: [s.i, s.j],
                 piece: s.piece,
@@ -155,7 +155,7 @@ impl<const D: usize> Springs<D> {
             .push(segments.body.bond(i as usize, j as usize));
         self.stiffness
             .push(segments.stiffness(i, j) * segments.scale(i, j) * segments.of_materials(i, j));
-        self.difference.push([
+        self.difference.push(vec![
             (segments.site[i as usize], -1.0),
             (segments.site[j as usize], 1.0),
         ]);

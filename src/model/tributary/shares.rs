@@ -41,7 +41,7 @@ fn of_patch<const D: usize>(model: &Model<D>) -> Transfer {
                 .collect(),
         }
     };
-    Transfer::from_rows((0..model.mesh.nodes.len()).map(row))
+    Transfer::from_rows(model.sites.len(), (0..model.mesh.nodes.len()).map(row))
 }
 
 /// The weights of all nodes, none of them negative where sites lie all around; none of a model whose nodes follow no such fit.
@@ -83,7 +83,7 @@ pub(super) fn shares<const D: usize>(model: &Model<D>) -> Option<Transfer> {
         });
         around.unwrap_or(own)
     });
-    Some(Transfer::from_rows(rows))
+    Some(Transfer::from_rows(model.sites.len(), rows))
 }
 
 /// The weights at `x`, exact for affine fields and none negative, that are nearest to the volumes of the sites `seen` within `reach`, less with the distance.

@@ -25,7 +25,7 @@ pub(super) fn with_law<const D: usize, T>(
         position: case.position.clone(),
         volume: case.volume.clone(),
         horizon: Horizon::Uniform(3.0 * H),
-        transfer: Transfer::new(),
+        transfer: Transfer::default(),
         // every third point is of the second material
         material: match law.several() {
             Some(_) => (0..points).map(|i| u16::from(i % 3 == 0)).collect(),

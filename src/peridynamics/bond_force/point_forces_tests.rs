@@ -64,7 +64,7 @@ fn pass_beside(
         position: case.position.clone(),
         volume: case.volume.clone(),
         horizon: Horizon::Uniform(3.0 * H),
-        transfer: Transfer::new(),
+        transfer: Transfer::default(),
         material: Vec::new(),
     };
     let (families, linear) = (case.families.clone(), law.linearised());

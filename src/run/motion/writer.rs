@@ -353,7 +353,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             .iter()
             .map(|(name, values)| (*name, values.as_slice()))
             .collect();
-        let of = |shown| snapshot(solved, &remembered, self.output.points, shown);
+        let of = |shown| snapshot(solved, &remembered, self.output, shown);
         let time = moment.state.time;
         let mut written = None;
         if let Some((piece, ranks)) = pieces {

@@ -63,7 +63,7 @@ impl<const D: usize> Breaking<D> {
             limit: bonds.iter().map(|bond| limit(*bond)).collect(),
             never: bonds.iter().map(fails).collect(),
             part,
-            difference: Transfer::from_rows(rows),
+            difference: Transfer::from_rows(model.sites.len(), rows),
         }
     }
 
@@ -109,7 +109,7 @@ impl<const D: usize> Breaking<D> {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        self.part.len() * (size_of::<Part<D>>() + 17) + self.difference.weight_count() * 12
+        self.part.len() * (size_of::<Part<D>>() + 17) + self.difference.matrix().nnz() * 12
     }
 }
 

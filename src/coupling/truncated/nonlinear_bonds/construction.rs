@@ -67,7 +67,7 @@ impl<const D: usize> NonlinearSeam<D> {
             without_energy,
             states: None,
             parts: Vec::new(),
-            difference: Transfer::new(),
+            difference: Transfer::new(body.cloud.transfer.sites()),
             bonds: Vec::new(),
             first: Vec::new(),
             own: 0,
@@ -192,7 +192,7 @@ impl<const D: usize> NonlinearSeam<D> {
         }
         let bond = self.bonds.len() as u32 - 1;
         of_site.extend(difference.iter().map(|&(site, w)| (site, number, w)));
-        self.difference.push(difference.iter().copied());
+        self.difference.push(difference.to_vec());
         self.parts.push(Part { bond, ..part });
         bond
     }

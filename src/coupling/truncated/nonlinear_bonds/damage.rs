@@ -87,7 +87,7 @@ impl<const D: usize> NonlinearSeam<D> {
             + self.breaks.as_ref().map_or(0, Breaking::memory_bytes)
             + self.states.as_ref().map_or(0, States::memory_bytes)
             + (self.softening.as_ref()).map_or(0, SeamSoftening::memory_bytes)
-            + self.difference.weight_count() * 28
+            + self.difference.matrix().nnz() * 28
             + self.families.neighbours.len() * 4
     }
 }
