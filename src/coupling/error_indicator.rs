@@ -1,6 +1,6 @@
 //! Regions where the local model would be wrong, and where a bond could break, estimated from the displacement at the nodes.
 //!
-//! A peridynamic law with an even kernel sees of a smooth field, to the second order in the horizon,
+//! The force densities of a peridynamic law with an even kernel and of its local limit differ under a smooth field, to second order in the horizon, by
 //!
 //! ```text
 //!   L_pd u − L_0 u = div τ + O(δ⁴),     τ = C : ℓ² ∇²ε(u),     ℓ² = 5/12 · 1/(D + 4) · ∫ λ r⁶ dV / ∫ λ r⁴ dV

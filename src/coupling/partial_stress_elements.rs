@@ -1,4 +1,4 @@
-//! Partial stress in finite elements: transition cells whose stress is the partial stress of peridynamic points at their Gauss points.
+//! Partial stress in finite elements: the stress of a transition cell is the partial stress of peridynamic points at its Gauss points.
 
 use std::sync::Arc;
 

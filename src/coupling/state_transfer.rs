@@ -1,4 +1,4 @@
-//! A motion handed from one layout of zones to another.
+//! Transfer of a motion from one layout of zones to another.
 //!
 //! Points that stay keep their displacement and velocity as they are, and so do nodes that stay. A point that takes the place of an element follows
 //!

@@ -1,9 +1,9 @@
 //! Seams whose faces cut the lattice anywhere: factors for the energies of pieces, and shares of dilatations, that make affine fields exact again.
 //!
-//! A piece keeps its form, `c s w(ξ, D/s)` with a factor `c`, and so do the whole bonds between the points that have pieces. Under `u = G x` it pulls with `c` times the force of the whole bond,
+//! A piece keeps its form, `c s w(ξ, Δu/s)` with a factor `c`, and so do the whole bonds between the points that have pieces. Under `u = G x` it pulls with `c` times the force of the whole bond,
 //! so equilibrium at every site is linear in the factors: the sums of `c k ξ⊗ξ⊗ξ` over the ends at a point vanish, those at a node, weighted with its shape function, equal the traction of the lattice times
 //! the integral of the shape function. These are D (D+1) (D+2)/6 conditions per site (the third-order tensor is symmetric). Of all factors that meet them, and stay above a floor so that every energy is positive, those nearest
-//! to 1 are taken. What a piece hands to the dilatations of an LPS is changed in the same way, without a floor: every point's dilatation is tr G, every element's a multiple of it, and their pressures balance
+//! to 1 are taken. What a piece contributes to the dilatations of an LPS is changed in the same way, without a floor: every point's dilatation is tr G, every element's a multiple of it, and their pressures balance
 //! at every site.
 //!
 //! If the seam follows the lattice nothing is missing, and nothing is changed.
@@ -44,7 +44,7 @@ pub struct SeamConditions {
     pub out_of_reach: f64,
 }
 
-/// Looks at the conditions of the pairwise part.
+/// Returns the conditions of the pairwise part.
 pub(super) fn conditions<const D: usize>(segments: &mut Segments<'_, D>) -> SeamConditions {
     let Missing { missing, .. } = missing(segments);
     segments.widen();

@@ -1,4 +1,4 @@
-//! The pieces of bonds inside of the peridynamic zone: their ends, their stiffness, and what they hand to dilatations.
+//! The pieces of bonds inside of the peridynamic zone: their ends, their stiffness, and their contributions to dilatations.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -43,7 +43,7 @@ pub(super) struct Changed {
     pub hands: [f64; 2],
 }
 
-/// Which bonds are whole, and the pieces of those that are not.
+/// Whole bonds, and the pieces of all others.
 #[derive(Clone)]
 pub(super) struct Segments<'a, const D: usize> {
     pub model: &'a Model<D>,
@@ -53,7 +53,7 @@ pub(super) struct Segments<'a, const D: usize> {
     pub site: Vec<u32>,
     /// Pieces of bonds that leave the zone or pass through it.
     pub cut: Vec<Segment>,
-    /// Bonds between points of the zone that are not whole, lower number first.
+    /// Bonds between points of the zone that leave it in between, lower number first.
     pub broken: FxHashSet<(u32, u32)>,
     /// For each point, true if it has a bond that is not whole, or one that a fit has changed.
     pub at_seam: Vec<bool>,

@@ -1,7 +1,7 @@
-//! Dilatations at a seam whose bonds turn, stretch and break.
+//! Dilatations at a seam whose bonds rotate, stretch and break.
 //!
-//! A part of the length s hands its elongation over, which to first order is `ξ·D` and in full `q = s |ξ|² ε`, ε its stretch: under any homogeneous deformation s times that of its whole bond. A dilatation is then
-//! `F = Σ b·u + Σ c q` with the energy `½ κ F²`; its first sum is an element's own `∫ div u`, which stays linear but for elements that follow the bonds (`element_dilatation.rs`).
+//! A part of the length s contributes its elongation, `ξ·Δu` to first order and `q = s |ξ|² ε` with its stretch ε in full. Under any homogeneous deformation q is s times that of the whole bond. A dilatation is
+//! `F = Σ b·u + Σ c q` with the energy `½ κ F²`. The first sum is an element's own `∫ div u`, linear except in elements that follow the bonds (`element_dilatation.rs`).
 
 use std::{borrow::Cow, collections::BTreeMap, sync::Arc};
 

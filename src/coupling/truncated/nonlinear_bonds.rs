@@ -1,9 +1,9 @@
-//! Bonds at a seam that turn, stretch and break: pieces one by one; whole bonds of a pairwise law are left to the pass over the body.
+//! Bonds at a seam that rotate, stretch and break: pieces one by one; whole bonds of a pairwise law are left to the pass over the body.
 //!
-//! A piece of the length s, a fraction of its bond ξ, has the energy `s w(ξ, D/s)`: it is stretched by `|ξ + D/s|/|ξ| − 1`, like the whole bond would be. The pieces of a bond break together, and take `s w` each, when the whole bond
+//! A piece of the length s, a fraction of its bond ξ, has the energy `s w(ξ, Δu/s)`: it is stretched by `|ξ + Δu/s|/|ξ| − 1`, as the whole bond would be. The pieces of a bond break together, and take `s w` each, when the whole bond
 //! passes the critical stretch, or soften together from its onset on (`softening.rs`): its ends move with their points, or with the elements that they lie in (`breaking.rs`). The elements behind the face keep their classical energy: a crack cannot go on into them.
 //!
-//! Of an LPS a piece also hands its elongation to dilatations (`dilatation_state.rs`). The energies of the points at the seam, halves of whole bonds and dilatations, are then here too, and the body's pass computes the others;
+//! In an LPS a piece also contributes its elongation to dilatations (`dilatation_state.rs`). The energies of the points at the seam, halves of whole bonds and dilatations, are then here too, and the body's pass computes the others;
 //! whole bonds break and soften there, and are reported here.
 
 mod breaking;
