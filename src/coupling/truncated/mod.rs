@@ -84,7 +84,7 @@ pub enum CutBonds {
     /// They rotate, stretch and break like others.
     #[default]
     Breaking,
-    /// They are rows of a matrix, which is cheaper. Damage that comes within two horizons of the seam is reported.
+    /// They are rows of a matrix, which is cheaper. No bond breaks within a horizon of the seam (two in an LPS); damage that reaches this layer is reported.
     Linear,
 }
 
