@@ -17,7 +17,7 @@
 //!
 //! and cells are taken out of `Ω`, the worst first, until the root of the sum is less than `tolerance` times that of `Σ_c V_c ε : C : ε`, the energy of the
 //! finite-element solution. `ℓ²∇²ε` is the difference between the strain of a cell and the mean of the strains around it, scaled by second
-//! moments. No more than the cell's own energy counts: at a corner, where ∇²ε knows no bound, the difference of two mean strains does.
+//! moments. It counts up to the cell's own energy only, since ∇²ε is unbounded at a corner.
 
 use rayon::prelude::*;
 

@@ -128,7 +128,7 @@ impl<'a, const D: usize> Segments<'a, D> {
         }
     }
 
-    /// Counts the neighbours of the points at the seam as at the seam.
+    /// Adds the neighbours of the points at the seam to these.
     pub fn widen(&mut self) -> bool {
         let wide = self.with_neighbours();
         let changes = wide != self.at_seam;
@@ -318,8 +318,8 @@ impl<const D: usize> Ends<'_, D> {
 
 /// Returns the factors of a piece's elongation in the dilatations at its ends.
 ///
-/// The two add up to 2, so a uniform pressure pulls at it as at the whole bond; over the pieces of parallel bonds of a lattice the surplus of the long ones makes up for the deficit of the short ones, so that an
-/// affine field has its own dilatation everywhere.
+/// The two add up to 2, so a uniform pressure acts on it as on the whole bond. Over the pieces of parallel bonds of a lattice the surplus of the long ones cancels the deficit of the short ones, so that the dilatation of
+/// an affine field is exact everywhere.
 fn hands_of(piece: &Piece) -> [f64; 2] {
     let length = piece.to - piece.from;
     [

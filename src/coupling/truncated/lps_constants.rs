@@ -13,9 +13,9 @@ use crate::{
 pub(super) struct LpsConstants {
     /// Normalisation of the dilatations of each lattice.
     pub over_m: Vec<Normal>,
-    /// K′ = κ − c of the material, not its bulk modulus κ; the same for all lattices.
+    /// `K′ = λ − μ` of the material, not its bulk modulus \[Pa\]; the same for all lattices.
     pub bulk: f64,
-    /// c of a position-aware solid, see `dilatation.rs`; none of an LPS, which has `c = (D + 2) μ/D` in the stiffness of its bonds.
+    /// c of a position-aware solid, see `dilatation.rs`; none of an LPS.
     pub deviatoric: Option<f64>,
 }
 
