@@ -48,7 +48,7 @@ pub struct Explicit<'a> {
     energies: Energies,
     block: usize,
     inverse_mass: Vec<f64>,
-    /// Internal force \[N\] at `n`, D entries per site.
+    /// Internal force \[N\] at `n`, `block` entries per site.
     force: Vec<f64>,
     /// External force \[N\] at `n`; on prescribed dofs that of load and support.
     load: Vec<f64>,

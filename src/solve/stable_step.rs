@@ -12,7 +12,7 @@
 //!
 //! Contact is not in the tangent at rest. The row sums of the certified bound contain a bound of its stiffness; the sharp bound adds [`RateBounds::stiffness`].
 //!
-//! Where `K` is not symmetric, λ may be negative or complex. Such a mode grows at any step, see [`crate::solve::instability_growth`].
+//! If `K` is not symmetric, λ may be negative or complex. Such a mode grows at any step, see [`crate::solve::instability_growth`].
 
 use crate::{
     solve::{
