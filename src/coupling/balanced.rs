@@ -1,4 +1,4 @@
-//! Balanced rows: part of a splice's and part of a blending's, so that what both leave out of balance cancels.
+//! Balanced rows: between a splice's and a blending's, so that their out-of-balance forces cancel.
 
 use crate::{
     coupling::{
@@ -11,15 +11,15 @@ use crate::{
     system::Symmetry,
 };
 
-/// Half of a splice's rows and half of a blending's, with a step in β at the edge of the nonlocal zone.
+/// Rows between those of a splice and of a blending, with a step in β at the edge of the nonlocal zone unless a function is given.
 ///
 /// Source: none; derived in `docs/methods.md`, section 8. Under a field with a third derivative the internal forces of a splice add up to `(M₆ − g) u‴/24` at a seam, those of a blending to
-/// `−(M₆′ − g) u‴/24`, whatever the width of β (suite `balance`). The shares `s` of the splice with `s (M₆ − g) = (1 − s)(M₆′ − g)` leave nothing: ½ for what bonds do by
-/// themselves. For the state part of a law the dilatation reaches over two horizons and its expansion over one, `M₆ = 8 L K′`, `M₆′ = 2 L K′`, `g = 2 h² K′` with
-/// `L = 3 Σω|ξ|⁴V / ((D + 2) Σω|ξ|²V)`, hence `s = (L − h²)/(5 L − 2 h²)`.
+/// `−(M₆′ − g) u‴/24` whatever the width of β (`bondline verify balance`). Here `M₆` and `M₆′` are sixth moments of the bonds, and `g = 2 C h²` belongs to elements of the size h. With the share `s` of the splice the sum vanishes
+/// if `s (M₆ − g) = (1 − s)(M₆′ − g)`. For the pairwise part `M₆′ = M₆`, hence `s = ½`. For the state part the dilatation reaches over two horizons and its expansion over one: `M₆ = 8 L K′`, `M₆′ = 2 L K′`, `g = 2 h² K′` with
+/// `L = 3 Σω|ξ|⁴V / ((D + 2) Σω|ξ|²V)` \[m²\], hence `s = (L − h²)/(5 L − 2 h²)`.
 ///
-/// Given a function, β runs through the transition zone instead of jumping; without, a transition zone is local. The stiffness is not symmetric. On meshes of the lattice's spacing nothing is left under cubic and quartic fields, for pairwise laws in 1D, 2D and 3D and for
-/// state-based ones in 1D; in 2D and 3D the shape tensors' fourth moments are not isotropic and a little remains. Elements coarser than the lattice leave the error of their own discretisation.
+/// With a function β varies through the transition zone; without one a transition zone is local. The stiffness is not symmetric. If elements have the spacing of the lattice, cubic and quartic fields leave no force for pairwise laws, and for
+/// state-based ones in 1D. In 2D and 3D `Σω|ξ|⁴` is not isotropic for the latter, and a small force remains. Coarser elements leave the error of their own discretisation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Balanced {
     /// β in the transition zone; none for a step at the edge of the nonlocal zone.
@@ -72,8 +72,8 @@ impl Balanced {
     }
 }
 
-/// The share of the splice for the state part of the law, from the moments of the largest families together: of several that are equally large none is
-/// preferred, or else the numbering of points that lie on no lattice would decide.
+/// Returns the share of the splice for the state part of the law, by the moments of all families of the largest size: with one of them alone the result would depend on
+/// the numbering of points that lie on no lattice.
 fn state_share<const D: usize>(body: &PdBody<D>, spacing: f64) -> f64 {
     let size = |i: usize| body.families.of(i).len();
     let largest = (0..body.families.len()).map(size).max().unwrap_or(0);

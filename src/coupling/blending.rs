@@ -43,14 +43,14 @@ impl BlendingFunction {
     }
 }
 
-/// Force-based blending, [SAND2015-7998] eq. (3.14), and the same idea carried to state-based laws: β of (3.9), weights of (3.12), the expansion of (3.13).
+/// Force-based blending, [SAND2015-7998] eq. (3.14), with β of (3.9), the weights (3.12) and the expansion (3.13); extended to state-based laws.
 ///
-/// The transition zone of the scene is the blending region `B_b`. Points fill it and a collar of one horizon around it, since a bond is weighted by
-/// `w = (β(x) + β(x′))/2`, which is not 0 there. What the weights `w` take from the force state is given back through the Taylor expansion of the
-/// force state at the point itself: first and second derivatives by compact least squares on the points around it.
+/// The transition zone of the scene is the blending region `B_b`. Points fill it and a collar of one horizon around it, since a bond has the weight
+/// `w = (β(x) + β(x′))/2`, which is not 0 there. The remaining share `1 − w` of the force acts on the Taylor expansion of the displacement at the
+/// point itself, whose first and second derivatives are least-squares fits to the nearest points.
 ///
-/// For a state-based law `T⟨ξ⟩ = p ξ(ξ·η) + ω (𝓜:Ḡ) ξ` the expansion takes `Ḡ ≈ ∇u K` and, at the other end of the bond, `Ḡ′ ≈ (∇u + ξ·∇∇u) K′`; for the products of a law with deviators
-/// `B ≈ P : ∇u` and `B′ ≈ P′ : (∇u + ξ·∇∇u)`. Each end has the coefficients of its own family, so that the row of an affine field is that of peridynamics at surfaces too.
+/// For a state-based law `T⟨ξ⟩ = p ξ(ξ·η) + ω (𝓜:Ḡ) ξ` the expansion takes `Ḡ ≈ ∇u K` and, at the other end of the bond, `Ḡ′ ≈ (∇u + ξ·∇∇u) K′`, with the shape tensor K. For a law with a [`StatePart::deviator`](crate::peridynamics::StatePart::deviator) it takes
+/// `B ≈ P : ∇u` and `B′ ≈ P′ : (∇u + ξ·∇∇u)`. Each end has the coefficients of its own family, so that an affine field has the force of peridynamics at surfaces too.
 #[derive(Clone, Copy, Debug)]
 pub struct Blending {
     /// β in the blending region.
@@ -110,7 +110,7 @@ pub(super) const CLOSED: f64 = 1.0 + 1e-6;
 /// Just below a horizon: where β is 0 at the edge, bonds of exactly one horizon have no weight.
 const OPEN: f64 = 1.0 - 1e-9;
 
-/// The roles of cells where points fill the nonlocal and transition zones, or the first alone, and a collar of width `reach` around them.
+/// Returns the roles of cells: points in the nonlocal zone, in the zone `outermost` and in a collar of width `reach` \[m\] around them, elements elsewhere.
 ///
 /// With a collar of one horizon the points cover `B_t` of [SAND2015-7998] eq. (3.11), where the mean (3.10) of β over a family lies between 0 and 1.
 pub(super) fn with_collar<const D: usize>(
@@ -165,13 +165,13 @@ pub(super) struct SpliceShare {
     pub state: f64,
 }
 
-/// Rows of bonds that are weighted by `s β(x) + (1 − s) (β(x) + β(x′))/2`, with what the weights take given back at the point itself.
+/// Rows of bonds with the weights `s β(x) + (1 − s) (β(x) + β(x′))/2`, and the remainder expanded at the point itself.
 pub(super) struct Blended<'a, const D: usize> {
     model: &'a Model<D>,
     body: &'a PdBody<D>,
     beta: Vec<f64>,
     share: SpliceShare,
-    /// For each point some of whose bonds are weighted.
+    /// For each point; none where all bonds have the weight 1.
     derivatives: Vec<Option<DerivativeWeights<D>>>,
 }
 
@@ -211,7 +211,7 @@ impl<'a, const D: usize> Blended<'a, D> {
         })
     }
 
-    /// The weights of the bond from point `i` to point `j`, for what it does by itself and for the state part: `(β(x) + β(x′))/2` of [SAND2015-7998] eq. (3.12) where no share is that of a splice.
+    /// The weights of the bond from point `i` to point `j`, for the pairwise part and for the state part: `(β(x) + β(x′))/2` of [SAND2015-7998] eq. (3.12) where the splice has no share.
     fn weights(&self, i: usize, j: usize) -> [f64; 2] {
         let (own, mean) = (self.beta[i], 0.5 * (self.beta[i] + self.beta[j]));
         [self.share.pair, self.share.state].map(|s| s * own + (1.0 - s) * mean)
@@ -255,7 +255,7 @@ impl<'a, const D: usize> Blended<'a, D> {
 }
 
 impl<const D: usize> Blended<'_, D> {
-    /// Adds what the weights took away, expanded at the point by [SAND2015-7998] eq. (3.13): the second and third terms of (3.14), whose first is the weighted row.
+    /// Adds the remainder, expanded at the point by [SAND2015-7998] eq. (3.13): the second and third terms of (3.14), whose first term is the weighted row.
     fn add_remainder(&self, i: usize, at: &DerivativeWeights<D>, row: &mut Row<D>) {
         let body = self.body;
         let (pair, omega) = body.kernel(i);

@@ -1,6 +1,6 @@
 //! Regions where the local model would be wrong, and where a bond could break, estimated from the displacement at the nodes.
 //!
-//! A peridynamic law with an even kernel sees of a smooth field, to the second order in the horizon,
+//! The force densities of a peridynamic law with an even kernel and of its local limit differ under a smooth field, to second order in the horizon, by
 //!
 //! ```text
 //!   L_pd u − L_0 u = div τ + O(δ⁴),     τ = C : ℓ² ∇²ε(u),     ℓ² = 5/12 · 1/(D + 4) · ∫ λ r⁶ dV / ∫ λ r⁴ dV
@@ -17,7 +17,7 @@
 //!
 //! and cells are taken out of `Ω`, the worst first, until the root of the sum is less than `tolerance` times that of `Σ_c V_c ε : C : ε`, the energy of the
 //! finite-element solution. `ℓ²∇²ε` is the difference between the strain of a cell and the mean of the strains around it, scaled by second
-//! moments. No more than the cell's own energy counts: at a corner, where ∇²ε knows no bound, the difference of two mean strains does.
+//! moments. It counts up to the cell's own energy only, since ∇²ε is unbounded at a corner.
 
 use rayon::prelude::*;
 

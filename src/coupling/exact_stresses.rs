@@ -1,5 +1,5 @@
-//! Partial stresses of geometrically exact bonds, as what they have beyond the linear ones, [SAND2015-7998] eq. (2.19): the rows of [`PartialStresses`] have ν to first order in the displacement;
-//! this is the rest, so that everything that needs a stiffness at rest finds it in the rows.
+//! Partial stresses of geometrically exact bonds, [SAND2015-7998] eq. (2.19), beyond their linear part: the rows of [`PartialStresses`] have ν to first order in the displacement,
+//! and are the stiffness at rest. The remainder is computed here.
 //!
 //! The family of a Gauss point is not that of a lattice point: its weights are fitted to fourth moments, which give the right stress to first order only.
 //! So the stress at a Gauss point is that of the element's own law at the gradient G of the element, and the force state gives what the family's deformation has beyond G:

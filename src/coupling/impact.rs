@@ -1,14 +1,14 @@
-//! Rigid impactors: bodies without strain that push the sites of both models out of themselves.
+//! Rigid impactors, in contact with the sites of both models.
 //!
-//! Contact is frictionless and by penalty. A site that lies at the depth `g` inside an impactor is pushed along the shortest way out, whose unit vector is `n`, with the force
+//! Contact is frictionless, by a penalty. A site at the depth `g` \[m\] inside an impactor is pushed along the shortest way out, with the unit vector `n`, by the force
 //!
 //! ```text
 //! f = k g n ,      k = factor · C₁₁ V / h² ,
 //! ```
 //!
 //! and the impactor with `−f`; the pair stores `½ k g²`. `C₁₁` is the longitudinal modulus of the material, `V` the part of the body that the site stands for and `h` its size: the edge of a point's
-//! whole cell, or the shortest edge of the cells around a node. On an even mesh `k` is proportional to the area that a site has of a surface, so that a flat face is pressed evenly. All sites count, wherever they lie at
-//! rest: a point that was torn off inside is pushed as one of the surface is. The body reaches beyond its points: those of the first layer to the surface of the mesh at rest, all others by `h/2`. That is added to the depth,
+//! whole cell, or the shortest edge of the cells around a node. On an even mesh `k` is proportional to the area that a site has of a surface, so that a flat face bears a uniform pressure. All sites count, wherever they lie at
+//! rest: debris from inside the body is pushed as well. The body reaches beyond its points: those of the first layer to the surface of the mesh at rest, all others by `h/2`. That is added to the depth,
 //! so that contact begins at the surface wherever the lattice lies.
 //!
 //! An impactor is one more site of the system that moves, with the mass of the impactor: one set of steps, energies, supports and checkpoints serves body and impactors

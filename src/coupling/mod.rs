@@ -1,31 +1,31 @@
-//! Couplings of a finite-element region to a peridynamic region, behind one seam.
+//! Couplings of a finite-element region to a peridynamic region. The surface between the two is the *seam*.
 //!
 //! | file | method | source |
 //! |---|---|---|
-//! | `uncoupled.rs` | pure FE, pure PD: ordinary values of the same switch | |
-//! | `splice.rs` | each site takes the equation of its own model | [SAND2015-7998] eq. (2.30) |
+//! | `uncoupled.rs` | finite elements alone, peridynamics alone | |
+//! | `splice.rs` | each site has the equation of its own model | [SAND2015-7998] eq. (2.30) |
 //! | `blending.rs` | force-based blending with a blending function β | eq. (3.9), (3.11), (3.12), (3.13), (3.14) |
-//! | `balanced.rs` | half of a splice's rows, half of a blending's: no force out of balance under quartic fields | `docs/methods.md` |
+//! | `balanced.rs` | rows between a splice's and a blending's, whose out-of-balance forces cancel to leading order | `docs/methods.md` |
 //! | `truncated/` | truncated bonds: symmetric, patch-exact, in equilibrium | `docs/truncated.md` |
-//! | `truncated_families/` | the same of laws whose points have a stress: symmetric, patch-exact at any strain, in equilibrium | `docs/truncated.md` |
+//! | `truncated_families/` | the same for laws whose points have a stress, patch-exact at any strain | `docs/truncated.md` |
 //! | `partial_stress.rs`, `partial_stress_elements.rs` | partial stress, meshfree and in finite elements | eq. (2.19), (2.20), (2.29), sections 7.2, 7.3 |
 //! | `exact_stresses.rs` | partial stresses of geometrically exact bonds | eq. (2.19) |
 //! | `terms.rs` | the sum of terms that every method returns, `f(u) = Σ R_k F_k(T u)` | |
 //! | `stresses.rs` | partial stresses as a term | eq. (2.19), (2.29) |
 //! | `problem.rs` | a body with its zones and a coupling | |
 //! | `rows.rs` | shared: rows of elements, the assembled stiffness | |
-//! | `error_indicator.rs` | where the local model would be wrong, and where a bond could break | |
-//! | `cauchy_born.rs` | elements that follow the bonds of the points at any stretch | eq. (2.10) |
-//! | `semidiscrete.rs`, `semidiscrete/` | a model that moves: bonds that stretch and break beside the rows of the rest | |
-//! | `impact.rs`, `impact/` | rigid impactors that push the sites of a model that moves, as a force term | |
-//! | `state_transfer.rs` | a motion handed from one layout of zones to another | |
-//! | `crate::model` | sites, points, families and the transfer, on which all methods stand | |
+//! | `error_indicator.rs` | error of the local model, and places where a bond could break | |
+//! | `cauchy_born.rs` | elements with the stress of the points' bonds at any stretch (Cauchy–Born) | eq. (2.10) |
+//! | `semidiscrete.rs`, `semidiscrete/` | a coupled model in motion: bonds that stretch and break, beside linear rows | |
+//! | `impact.rs`, `impact/` | contact with rigid impactors, as a force term | |
+//! | `state_transfer.rs` | transfer of a motion to another layout of zones | |
+//! | `crate::model` | sites, points, families and the transfer, shared by all methods | |
 //! | `crate::assembly` | rows, and places expressed through sites | |
 //!
-//! Every method is *force-based*: each site has one row, its internal force by the model that holds there. A row that vanishes under
-//! every affine field, whatever its neighbours' rows are, makes the patch test pass; so all that a seam must provide is (a) complete families and complete patches of
-//! cells around every site and (b) places outside a site's own region whose displacement is interpolated exactly for affine fields.
-//! A method is one file with a [`Coupling`], one line here and its entry in the scene.
+//! A *site* is a node or a peridynamic point with degrees of freedom, and has one row of the stiffness. The truncated couplings derive their rows from an energy. All others are *force-based*: a row is
+//! the internal force by the model that holds at the site. If each row vanishes by itself under every affine field, the patch test passes. A seam must therefore provide (a) complete families and complete
+//! patches of cells around every site and (b) displacements outside a site's own region that are interpolated exactly for affine fields.
+//! A new method is a file with a [`Coupling`], a line in this table and an entry in the scene (`docs/extending.md`).
 
 /// Implements [`Coupling`] by the function `rows` of a method, compiled here for one, two and three dimensions.
 macro_rules! coupling_by_rows {
@@ -85,7 +85,7 @@ use crate::model::{Model, ModelError, ZoneLayout};
 
 /// A method that couples both regions.
 pub trait Coupling<const D: usize>: ZoneLayout<D> {
-    /// The terms of the model by this method.
+    /// The internal force of the model by this method, as a sum of terms.
     ///
     /// # Errors
     /// [`ModelError`] if the method cannot be applied to this model, with the remedy.

@@ -1,4 +1,4 @@
-//! Meshfree partial stress: transition points that feel the divergence of the peridynamic partial stress.
+//! Meshfree partial stress: the force on a transition point is the divergence of the peridynamic partial stress.
 
 use std::sync::Arc;
 
@@ -16,24 +16,24 @@ use crate::{
     tensor::{Tensor, Vector},
 };
 
-/// Partial stress with a meshfree divergence, and a control of the short waves that it does not see.
+/// Partial stress with a meshfree divergence, and a control of its zero-energy modes.
 ///
-/// Source: [SAND2015-7998] eq. (2.29), with the divergence (2.20) of the partial stress (2.19) as in section 7.2: in the transition zone
-/// `L(x) = Tr(∇ν^ps) = Σ ω {ν(x′) − ν(x)} K⁻¹ ξ V`, with `K = Σ ω ξ⊗ξ V`; peridynamic in the nonlocal zone, finite elements in the local zone.
+/// Source: [SAND2015-7998] eq. (2.29), with the divergence (2.20) of the partial stress (2.19) as in section 7.2: the force density in the transition zone is
+/// `L(x) = ∇·ν^ps = Σ ω {ν(x′) − ν(x)} K⁻¹ ξ V′`, with `K = Σ ω ξ⊗ξ V′`. The nonlocal zone is peridynamic, the local zone consists of finite elements.
 /// The horizon may vary in the transition zone.
 ///
-/// Differs from it by: the control of Silling (2017), with the gradient `F = Σ ω η⊗ξ V K⁻¹` of either end of a bond,
+/// Differs from it by: the control of \[Silling2017\], with the gradient `F = Σ ω η⊗ξ V′ K⁻¹` of the displacement at either end of a bond,
 ///
 /// ```text
-///   + Σ c (2η − {F(x) + F(x′)} ξ) V′ ,     c = κ C₁₁₁₁ ω D / Σ ω |ξ|² V .
+///   + Σ c (2η − {F(x) + F(x′)} ξ) V′ ,     c = κ C₁₁₁₁ ω D / Σ ω |ξ|² V′ ,     κ = 0.1 .
 /// ```
 ///
-/// Stress and divergence are both differences to either side of a point, `Σ ω ξ sin(k·ξ)`. For waves of two to some spacings they vanish, or have opposite signs: the symbol of their product is
-/// indefinite (−0.015 of that of the nearest neighbours), so that a zone of some lengths holds standing waves which nothing resists. The control vanishes for every affine field on any families, on whole ones of a
-/// lattice for every cubic field, and its symbol is nowhere negative: `(Σ ω ξ sin)ᵀ K⁻¹ (Σ ω ξ sin) ≤ Σ ω sin² ≤ 2 Σ ω (1 − cos)`.
+/// Stress and divergence are both central differences, with the symbol `Σ ω ξ sin(k·ξ)` for the wave vector k. For waves of a few spacings their symbols vanish or have opposite signs. The symbol of the product is then
+/// indefinite (−0.015 of that of the nearest neighbours), and short standing waves meet no resistance. The control vanishes for affine fields on any family and for cubic fields on whole families of a
+/// lattice. Its symbol is nowhere negative: `(Σ ω ξ sin)ᵀ K⁻¹ (Σ ω ξ sin) ≤ Σ ω sin² ≤ 2 Σ ω (1 − cos)`.
 #[derive(Clone, Copy, Debug)]
 pub struct PartialStressMeshfree {
-    /// ω of the divergence.
+    /// ω of the divergence and of the control.
     pub influence: Influence,
 }
 
@@ -91,7 +91,7 @@ impl PartialStressMeshfree {
     }
 }
 
-/// Strength κ of the control.
+/// Strength κ of the control \[1\].
 ///
 /// The least eigenvalue of the symbol over that of the nearest neighbours, bond-based with `1/|ξ|` and the Gaussian divergence: in the plane at m = 3 it is −0.010, 0.012 and 0.024 with κ = 0, 0.05 and
 /// 0.1, at m = 6 −0.007, 0.003 and 0.006, in space at m = 2 −0.017, 0.015 and 0.037. A long wave is stiffer by `κ (kδ)²/7` in a bar, where bonds make it softer by `(kδ)²/24`.
@@ -103,9 +103,9 @@ const CHUNK: usize = 256;
 struct Meshfree<'a, const D: usize> {
     model: &'a Model<D>,
     influence: Influence,
-    /// κ C₁₁₁₁ [Pa].
+    /// κ C₁₁₁₁ \[Pa\].
     control: f64,
-    /// Of each point `K⁻¹` and the trace of `K`; none where there is no inverse.
+    /// `K⁻¹` and the trace of `K` for each point; none where K is singular.
     shapes: Vec<Option<(Tensor<D>, f64)>>,
 }
 
@@ -175,9 +175,9 @@ impl<const D: usize> Meshfree<'_, D> {
         Some((shape.try_inverse()?, shape.trace()))
     }
 
-    /// The points whose stresses the divergence at a transition point takes, with their weights: `∇·ν^ps` of [SAND2015-7998] eq. (2.20), as section 7.2 discretises it.
+    /// Returns the points whose stresses enter the divergence at a transition point, with their weights \[m^(D−1)\]: `−V ∇·ν^ps` of [SAND2015-7998] eq. (2.20), as section 7.2 discretises it.
     fn divergence(&self, body: &PdBody<D>, i: usize) -> Vec<(usize, Vector<D>)> {
-        // a family whose law could be evaluated has a regular shape tensor (checked in `operator`'s model)
+        // a point whose bonds do not span the space has a singular K, and no divergence
         let Some((inverse, _)) = self.shapes[i] else {
             return Vec::new();
         };
@@ -195,7 +195,7 @@ impl<const D: usize> Meshfree<'_, D> {
         on
     }
 
-    /// Adds the row of the control, minus its force on the point.
+    /// Adds the row of the control: minus its force on the point.
     fn add_control(&self, body: &PdBody<D>, i: usize, row: &mut Row<D>) {
         let Some((_, trace)) = self.shapes[i] else {
             return;
@@ -218,7 +218,7 @@ impl<const D: usize> Meshfree<'_, D> {
         row.spread(transfer);
     }
 
-    /// Gathers the row of `F a` at a point.
+    /// Gathers the row of `F a` at point `j`, F the gradient of the displacement there.
     fn add_gradient(&self, body: &PdBody<D>, j: usize, a: &Vector<D>, row: &mut Row<D>) {
         let Some((inverse, _)) = self.shapes[j] else {
             return;

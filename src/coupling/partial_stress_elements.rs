@@ -1,4 +1,4 @@
-//! Partial stress in finite elements: transition cells whose stress is the partial stress of peridynamic points at their Gauss points.
+//! Partial stress in finite elements: the stress of a transition cell is the partial stress of peridynamic points at its Gauss points.
 
 use std::sync::Arc;
 
@@ -29,7 +29,7 @@ use crate::{
 /// Families of Gauss points are irregular; unless the law is exact there, bond weights are fitted to the fourth moments, so that `ν^ps` is exact for affine fields.
 #[derive(Clone, Copy, Debug)]
 pub struct PartialStressElements {
-    /// Degree of the least-squares fit (the report says quadratic).
+    /// Degree of the least-squares fit that nodes of the seam follow (quadratic in the report).
     pub fit: FitDegree,
 }
 
@@ -140,9 +140,8 @@ impl<'a, const D: usize> Elements<'a, D> {
 
     /// Families of the Gauss points, which are the last of the cloud and have these horizons.
     ///
-    /// At a free surface or edge a family lacks bonds. What is left may be too few for the moment conditions of the law, or may meet them only with negative
-    /// weights, which soften the edge: on the coupled bar with free sides (3D, m = 2) sites there were off by 2.3 % (LPS) and 84 % (bond-based) of the largest
-    /// displacement, against 0.3 % and 4.7 % now. Such a family is given a wider horizon, step by step, until weights that are not negative carry the law.
+    /// At a free surface or edge a family lacks bonds. The rest may be too few for the moment conditions of the law, or may meet them only with negative
+    /// weights, which soften the edge. The horizon of such a family is widened step by step until non-negative weights meet the conditions.
     fn families(
         model: &Model<D>,
         cloud: &Cloud<D>,

@@ -6,10 +6,10 @@ use crate::tensor::{Tensor, Vector};
 
 const NONE: u32 = u32::MAX;
 
-/// Strains are averaged over this many sizes of a cell, or over a horizon where that is less. Wider means cost more and round corners; narrower ones take the noise of the mesh for a gradient.
+/// Radius over which strains are averaged, in sizes of a cell, unless a horizon is less. A wider mean costs more and rounds corners; a narrower one takes the noise of the mesh for a gradient.
 const AVERAGED_OVER: f64 = 2.5;
 
-/// And at least over so many, or a cell has no neighbour.
+/// Least radius, in sizes of a cell, with which a cell has neighbours.
 const AT_LEAST: f64 = 1.5;
 
 /// Tolerance on the offset of centres from their places in a regular mesh, relative to the size of a cell.

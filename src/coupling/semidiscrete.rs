@@ -1,20 +1,20 @@
-//! A coupled model that moves: bonds that stretch, and break, beside the rows of finite elements and of the seam.
+//! A coupled model in motion: bonds that stretch and break, beside the linear rows of finite elements and of the seam.
 //!
-//! | file | what |
+//! | file | content |
 //! |---|---|
-//! | `behaviour.rs` | how bonds deform and break, as a run asks for it |
-//! | `body_state.rs` | damage, stresses and memory, as results show them |
-//! | `heat.rs`, `heated_forces.rs` | bonds that know their temperature |
+//! | `behaviour.rs` | deformation and failure of bonds, as a run asks for it |
+//! | `body_state.rs` | damage, stresses and history variables, as results show them |
+//! | `heat.rs`, `heated_forces.rs` | bonds with thermal expansion |
 //! | `construction.rs`, `pass_input.rs` | masses, rows and bonds of the model; input of the bond pass |
 //! | `body.rs`, `force_states.rs`, `elements.rs` | the points and their bonds, nonlinear force states, nonlinear finite elements |
 //! | `rows.rs`, `tangent_pattern.rs` | linear rows of the sites, blocks of the elements' tangent |
-//! | `energy.rs`, `stored_energy.rs`, `dissipation.rs` | energies of elements and bonds, what breaking costs |
+//! | `energy.rs`, `stored_energy.rs`, `dissipation.rs` | energies of elements and bonds, dissipation by breaking |
 //! | `split.rs`, `shared_work.rs`, `own_steps.rs`, `reached_sites.rs`, `spread_families.rs` | the same on several processes |
 //!
 //! Sites whose row is that of the peridynamic body alone ([`BondsOfSite::Alone`](crate::coupling::BondsOfSite::Alone)) take their force from a pass over the bonds, which may be geometrically exact
-//! and break; every other site takes it from its row of the linear stiffness, which those bonds do not enter. At rest both are the operator of the static solve.
+//! and may break. Every other site takes it from its row of the linear stiffness, which does not contain those bonds. At rest both together are the operator of the static solution.
 //!
-//! A seam that has bonds of its own ([`Term::SeamBonds`](crate::coupling::Term::SeamBonds)) takes those that are exact or break out of the rows too: what is left are finite elements.
+//! If the bonds that a seam cuts are exact or break ([`Term::SeamBonds`](crate::coupling::Term::SeamBonds)), they leave the rows too, and only finite elements remain there.
 
 use std::sync::PoisonError;
 
@@ -54,24 +54,25 @@ mod spread_families;
 mod stored_energy;
 mod tangent_pattern;
 
-/// A coupled model as a system that moves.
+/// A coupled model as a semi-discrete system, `M ü = f − F(u)`.
 pub struct CoupledSystem<'a, const D: usize> {
     model: &'a Model<D>,
     symmetry: Symmetry,
+    /// Lumped mass of each site \[kg\].
     mass: Vec<f64>,
-    /// Rows of all sites but those of the body alone; of sites that share the body's bonds, what is left of them.
+    /// Rows of all sites but those of the body alone, without the bonds that the pass computes.
     linear: SiteRows,
-    /// Their products, kept between passes.
+    /// Products of these rows with the displacement, a buffer.
     products: Vec<f64>,
     body: Option<MovingBody<D>>,
-    /// Bonds of the seam, if they are exact or break; the rows are those of the finite elements alone then.
+    /// Bonds of the seam, if they are exact or break; the rows are then those of the finite elements alone.
     seam: Option<NonlinearSeam<D>>,
     /// Contribution of the partial stresses of exact bonds beyond the rows, where elements follow the bonds.
     stresses: Option<ExactStresses<D>>,
     energy: ElementEnergy,
     /// Elements whose law is not linear, if there are any.
     elements: Option<LocalElements<D>>,
-    /// Free expansion of elements whose law expands by itself; none where nothing expands.
+    /// Free thermal expansion, in elements whose law takes it into account; none where nothing expands.
     heat: Option<FreeStretch<D>>,
     /// Distribution of the sites over processes, where several compute them.
     split: Option<split::Split<'a>>,
@@ -79,13 +80,13 @@ pub struct CoupledSystem<'a, const D: usize> {
     is_shareable: bool,
     /// Data of steps of which each process takes its own, once these have begun.
     own_steps: Option<own_steps::OwnSteps>,
-    /// Dissipation by breaking bonds so far.
+    /// Dissipation so far, by breaking bonds and by inelastic laws.
     spent: Dissipation,
     /// See [`Tangent::difference_length`].
     difference_length: Option<f64>,
 }
 
-/// Lumped mass of every site \[kg\]: that of its part of the body. All masses add up to that of the body, their first moment too.
+/// Lumped mass of every site \[kg\]: that of its part of the body. The sum of all masses and their first moment are those of the body. `density` gives ρ [kg/m^D] of a material's number.
 pub fn masses<const D: usize>(model: &Model<D>, density: impl Fn(u16) -> f64) -> Vec<f64> {
     let own = model.peridynamic_material();
     model.tributary().masses(own, density)
@@ -219,7 +220,7 @@ impl<const D: usize> Tangent for CoupledSystem<'_, D> {
         let mut sums = self.linear.row_sums::<D>();
         let Some(body) = &self.body else { return sums };
         let points = body.pass.row_sums();
-        // a point that follows sites spreads its column over them: at most the sum of its weights' sizes
+        // a point that follows sites distributes its column over them: at most by the sum of its weights in absolute values
         let spread = (0..body.site_of_point.len())
             .map(|p| match &body.transfer {
                 Some(transfer) => transfer.row(p).map(|(_, w)| w.abs()).sum::<f64>(),

@@ -1,4 +1,4 @@
-//! Splice: each site takes the equation of its own model, and sees across the seam the continuation of that model.
+//! Splice: each site has the equation of its own model, which is continued across the seam.
 
 use crate::{
     coupling::{Coupling, Operator, uncoupled::own_model},
@@ -13,9 +13,9 @@ use crate::{
 
 /// The splice of a local and a peridynamic region.
 ///
-/// Source: [SAND2015-7998] eq. (2.30): `L = L^pd` in `B_pd`, `L = L^0` in `B_0`. A transition zone, if the scene has one, is local.
+/// Source: [SAND2015-7998] eq. (2.30): the internal force density is `L = L^pd` in the nonlocal zone `B_pd`, `L = L^0` in the local zone `B_0`. A transition zone, if the scene has one, is local.
 /// A peridynamic family that reaches into `B_0` is completed by points interpolated from finite elements, and an element that reaches into `B_pd` by nodes fitted to
-/// peridynamic points; hence no ghost forces, and no symmetry.
+/// peridynamic points. Affine fields therefore leave no ghost force; the stiffness is not symmetric.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Splice;
 

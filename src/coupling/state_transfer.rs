@@ -1,4 +1,4 @@
-//! A motion handed from one layout of zones to another.
+//! Transfer of a motion from one layout of zones to another.
 //!
 //! Points that stay keep their displacement and velocity as they are, and so do nodes that stay. A point that takes the place of an element follows
 //!
@@ -7,8 +7,8 @@
 //! ```
 //!
 //! with the shape functions `N_a` of the element and gradients `G_a` at its nodes, by least squares from the nodes around: continuous from element to element, and exact
-//! for quadratic fields on cells of any shape, for `Σ N_a (x_a − x) = 0` and the second derivatives of `u_a` and `½ G_a` cancel. Shape functions alone are exact for affine fields
-//! only, and the energy of what they make of a wave is off by the square of its wave number. A node that comes alive follows a quadratic fit to the points around it.
+//! for quadratic fields on cells of any shape, since `Σ N_a (x_a − x) = 0` and the second derivatives of `u_a` and `½ G_a` cancel. Shape functions alone are exact for affine fields
+//! only, and change the energy of a wave by the square of its wave number. A new node starts from a quadratic fit to the points around it.
 
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -47,7 +47,7 @@ impl<const D: usize> BrokenBonds<D> {
         Self { of }
     }
 
-    /// Which bonds of the points at `position` these are: whether the bond from point `i` to point `j` is one.
+    /// Returns a predicate of points at `position`: true if the bond from point `i` to point `j` is one of these.
     pub fn among<'a>(
         &'a self,
         position: &'a [Vector<D>],
@@ -110,7 +110,7 @@ impl Carrying {
 }
 
 impl<const D: usize> Carried<D> {
-    /// Takes leave of a layout.
+    /// Records the positions of the sites of a layout.
     pub fn of(model: &Model<D>) -> Self {
         let position: Vec<Vector<D>> = model.sites.iter().map(|s| s.position).collect();
         let mut node_site = vec![NONE; model.mesh.nodes.len()];

@@ -4,7 +4,7 @@
 //!   f_s = Σ_j ν_j a_sj ,     ν_j = Σ T⟨ξ⟩ ⊗ ξ V
 //! ```
 //!
-//! Source: [SAND2015-7998] eq. (2.19) and (2.29): `a_sj` are the weights of a divergence, or gradients of shape functions at Gauss points. Rows have ν to first order in the displacement; [`ExactStresses`](super::ExactStresses) has the rest.
+//! Source: [SAND2015-7998] eq. (2.19) and (2.29): `a_sj` are the weights of a divergence, or gradients of shape functions at Gauss points. Rows have ν to first order in the displacement; [`ExactStresses`](super::ExactStresses) has the remainder. Units: ν \[Pa\], a \[m^(D−1)\], f \[N\].
 
 use std::sync::Arc;
 

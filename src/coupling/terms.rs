@@ -1,13 +1,13 @@
 //! The internal force of a coupled model as a sum of terms, `f(u) = Σ_k R_k F_k(T u)`.
 //!
-//! T is the transfer of the model ([`crate::assembly::Transfer`]): displacements of all places, from those of the sites. Each [`Term`] is one `R_k F_k` by the rows of the sites that feel it: with
-//! `R = Tᵀ` for energy methods, 0 or 1 for a splice, or weights within the bonds for a blending. Statics take the rows of all terms; in motion and at finite strains
-//! each kind of term is what it is there: rows that stay, bonds that the pass over the bonds computes, bonds of a seam, stresses of exact bonds.
+//! At rest `f = K u`, the negative of the force density `L` of `docs/methods.md` times a volume. The transfer T ([`crate::assembly::Transfer`]) gives the displacements of all places (points in elements, Gauss points) from those `u` of the sites.
+//! Each [`Term`] is one `R_k F_k`. R distributes its forces to the rows of the sites: `R = Tᵀ` for an energy, 0 or 1 for a splice, weights within the bonds for a blending. Linear statics assemble the rows of all terms. In motion and at finite strains
+//! linear rows stay as they are, and the forces of bonds, of bonds that a seam cuts and of partial stresses are computed from the deformation.
 
 use super::{NonlinearSeam, PartialStresses};
 use crate::{assembly::Row, model::Model, tensor::Tensor};
 
-/// Adds to the row of a site, minus the force there.
+/// Adds to the row of a site in `K`: minus the force that its material exerts there.
 pub type AddRow<'a, const D: usize> = Box<dyn Fn(usize, &mut Row<D>) + Send + Sync + 'a>;
 
 /// Evidence that the energy behind symmetric rows is never negative.
@@ -15,20 +15,20 @@ pub type AddRow<'a, const D: usize> = Box<dyn Fn(usize, &mut Row<D>) + Send + Sy
 pub enum Definiteness {
     /// It is a sum of squares, whatever the model is.
     SumOfSquares,
-    /// It is one but for small terms of either sign, along the edges of a nonlocal zone in 3D or where two influence functions of a law differ. They cancel under affine fields; the matrix at hand decides about others.
+    /// It is one but for small terms of either sign, along the edges of a nonlocal zone in 3D or where two influence functions of a law differ. These cancel under affine fields; for other fields the matrix has to be examined.
     EdgeTerms,
-    /// Terms of the seam are negative: a run factorises the matrix before it trusts it.
+    /// Terms of the seam are negative: a run factorises the matrix first.
     NegativeTerms,
 }
 
 /// The bonds of the body in the row of a site, ascending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum BondsOfSite {
-    /// None: bonds of its own coefficients, weighted bonds and stresses belong to other terms.
+    /// None: weighted bonds, bonds with coefficients of their own and stresses belong to other terms.
     None,
     /// Some, or all, among other terms.
     Among,
-    /// All bonds of a point, whole, and nothing else: only there may bonds break.
+    /// All bonds of a point, whole, and nothing else. Bonds may break there; elsewhere only with [`SeamBonds`] in motion.
     Alone,
 }
 
@@ -36,9 +36,9 @@ pub enum BondsOfSite {
 pub struct BodyBonds<'a, const D: usize> {
     /// The bonds in the row of a site.
     pub at: Box<dyn Fn(usize) -> BondsOfSite + Send + Sync + 'a>,
-    /// Returns true if the bond between two points, the first of a site that has bonds [`BondsOfSite::Among`] other terms, is one of those. A bond that the seam cuts is not: as one of the body it would pull at its point as it rotates, and at the finite elements as if it did not.
+    /// Returns true if the bond between two points, the first of a site that has bonds [`BondsOfSite::Among`] other terms, is one of those. A bond that the seam cuts is not: as a bond of the body its force would rotate at the point, and not at the finite elements.
     pub holds: Box<dyn Fn(usize, usize) -> bool + Send + Sync + 'a>,
-    /// For each site the feet of families that follow it, with their weights: it takes their forces. Empty where the body has none.
+    /// For each site the feet of families that follow it (see [`TruncatedFamilies`](super::TruncatedFamilies)), with their weights: the site takes their forces. Empty where the body has none.
     pub feet: Vec<Vec<(u32, f64)>>,
 }
 
@@ -73,19 +73,19 @@ impl<'a, const D: usize> BodyBonds<'a, D> {
     }
 }
 
-/// Bonds that a seam cuts, which turn, stretch and break like others.
+/// Bonds that a seam cuts, which rotate, stretch and break like others.
 pub struct SeamBonds<'a, const D: usize> {
     /// Adds the row of a site at rest.
     pub add_row: AddRow<'a, D>,
     /// The same bonds, geometrically exact, or breaking; with them the whole bonds of the points at the seam, which leave [`BodyBonds`].
     pub in_motion: Box<dyn Fn() -> NonlinearSeam<D> + Send + Sync + 'a>,
-    /// Adds what the row of a node has beside those.
+    /// Adds the part of the row of a node that the bonds in motion leave to the matrix.
     pub add_beside: AddRow<'a, D>,
 }
 
 /// A force `R F(T u)` of a coupled model.
 pub enum Term<'a, const D: usize> {
-    /// Linear in the displacement, whatever bonds do: finite elements by their elastic tensor, weighted bonds, controls, cut bonds that stay whole.
+    /// Linear in the displacement: finite elements by their elastic tensor, weighted bonds, controls, cut bonds that neither rotate nor break.
     Rows(AddRow<'a, D>),
     /// Bonds of the body.
     Bonds(BodyBonds<'a, D>),
@@ -95,13 +95,13 @@ pub enum Term<'a, const D: usize> {
     Stresses(PartialStresses<'a, D>),
 }
 
-/// A coupled model: the sum of its terms, and the facts that a run asks for. Every part is required.
+/// A coupled model: the sum of its terms, and its properties. Every part is required.
 pub struct Operator<'a, const D: usize> {
     /// Sites, points and the transfer.
     pub model: &'a Model<D>,
     /// The terms, in the order in which their rows are added.
     pub terms: Vec<Term<'a, D>>,
-    /// The blending function β of a site: 1 where it is peridynamic, 0 where it is local.
+    /// The blending function β of a site: 1 where it is peridynamic, 0 where it is local, ½ at transition points of meshfree partial stress.
     pub beta: Box<dyn Fn(usize) -> f64 + Send + Sync + 'a>,
     /// True if rows count elements and bonds by their materials, [`Row::count_only`]: only then do materials expand differently at the seam.
     pub counts_materials: bool,
@@ -110,7 +110,7 @@ pub struct Operator<'a, const D: usize> {
 }
 
 impl<const D: usize> Operator<'_, D> {
-    /// Adds the internal force of a site at rest, times −1 (`K u = f`).
+    /// Adds the row of a site at rest, in the sense of `K u = f` with the external force f.
     pub fn add_row(&self, site: usize, row: &mut Row<D>) {
         for term in &self.terms {
             match term {
@@ -122,7 +122,7 @@ impl<const D: usize> Operator<'_, D> {
         }
     }
 
-    /// Adds the part of that row that the bonds of the body do not have; `is_exact_seam` where those of the seam move by themselves too.
+    /// Adds that row without the bonds of the body; with `is_exact_seam` also without those of the seam that move ([`SeamBonds::in_motion`]).
     pub fn add_row_beside_bonds(&self, site: usize, is_exact_seam: bool, row: &mut Row<D>) {
         for term in &self.terms {
             match term {
@@ -165,12 +165,12 @@ impl<const D: usize> Operator<'_, D> {
         })
     }
 
-    /// Number of directed bonds beside those of the peridynamic body (Gauss points).
+    /// Number of directed bonds in the families of Gauss points, beside those of the peridynamic body.
     pub fn additional_bonds(&self) -> usize {
         self.stresses().map(PartialStresses::additional_bonds).sum()
     }
 
-    /// The mean partial stress of a cell; none of a cell whose stress is that of its own law.
+    /// The mean partial stress of a cell \[Pa\] under the displacements `u` \[m\], D per site; none of a cell whose stress is that of its own law.
     pub fn cell_stress(&self, cell: usize, u: &[f64]) -> Option<Tensor<D>> {
         (self.stresses()).find_map(|stresses| stresses.cell_stress(cell, u))
     }

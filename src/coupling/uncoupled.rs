@@ -1,4 +1,4 @@
-//! One model everywhere: pure finite elements and pure peridynamics, as couplings that have nothing to couple.
+//! One model everywhere: finite elements alone and peridynamics alone, as couplings.
 
 use crate::{
     coupling::{BodyBonds, Coupling, Definiteness, Operator, Term},

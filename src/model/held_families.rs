@@ -1,4 +1,4 @@
-//! Which families each of several processes holds: those of its own points, and of all points beside elements.
+//! Families that each of several processes holds: those of its own points, and of all points beside elements.
 //!
 //! Beside elements every process works out the seam as one process does, whose rows, fits and proofs look at the families of several points. That is a layer; inside of it bonds lie with
 //! the owner of their point alone.
@@ -14,7 +14,7 @@ pub(crate) const fn depth_of_seam(is_pairwise: bool) -> usize {
     if is_pairwise { 2 } else { 4 }
 }
 
-/// Which families a process holds beside those of its own points.
+/// Families that a process holds beside those of its own points.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HeldFamilies {
     /// Those of the points in the families of its own, too.

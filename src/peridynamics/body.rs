@@ -28,9 +28,9 @@ use crate::{
 pub enum BondWeights {
     /// The kernel as the papers have it. On a lattice the elastic tensor is then not isotropic.
     Plain,
-    /// The smallest change of the weights, shell by shell of the lattice, that makes the fourth moments those of the typed material.
+    /// The smallest change of the weights, shell by shell of the lattice, that makes the fourth moments those of the specified material.
     Isotropic,
-    /// The smallest change of each family's own weights that meets all fourth-moment conditions; for families that are no lattice.
+    /// The smallest change of each family's own weights that meets all fourth-moment conditions; for irregular families.
     Fitted,
 }
 
@@ -121,7 +121,7 @@ impl<const D: usize> Scratch<D> {
 impl<const D: usize> PdBody<D> {
     /// Builds the coefficients of all bonds.
     ///
-    /// `mirrored`: a pairwise law gives both ends of a bond the same coefficient, so bonds are visited from one end only.
+    /// With [`Ends::Alike`] a pairwise law gives both ends of a bond the same coefficient, so that the row of a point counts its own bonds twice and visits no others.
     ///
     /// # Errors
     /// [`PointError`] with the point whose family is empty, degenerate or cannot be fitted.
@@ -215,13 +215,13 @@ impl<const D: usize> PdBody<D> {
         self.families.neighbours.len()
     }
 
-    /// The bond vector from point `i` to point `j`.
+    /// The bond vector from point `i` to point `j` \[m\].
     #[inline]
     pub fn bond(&self, i: usize, j: usize) -> Vector<D> {
         self.cloud.position[j] - self.cloud.position[i]
     }
 
-    /// The coefficients `p` and `ω` (0 for a pairwise law) of the bonds of point `i`.
+    /// The coefficients `p` \[Pa/m^(D+4)\] and `ω` \[1\] (empty for a pairwise law) of the bonds of point `i`, one entry per bond.
     pub fn kernel(&self, i: usize) -> (&[f64], &[f64]) {
         let range = self.families.offsets[i]..self.families.offsets[i + 1];
         (
@@ -239,7 +239,7 @@ impl<const D: usize> PdBody<D> {
         self.state[i].as_ref()
     }
 
-    /// The classical tensor that the family of point `i` carries, [SAND2015-7998] eq. (2.10).
+    /// The collapsed tensor of the family of point `i` \[Pa\], [SAND2015-7998] eq. (2.10).
     pub fn collapsed_tensor(&self, i: usize) -> Tensor4<D> {
         let (xi, volumes): (Vec<_>, Vec<_>) = self
             .families
@@ -265,7 +265,7 @@ impl<const D: usize> PdBody<D> {
         self.add_force_row_of_parts(i, |j| [weight(j); 2], row);
     }
 
-    /// As [`PdBody::add_force_row`], with one weight for what a bond does by itself (`p` and `q`) and another for the state part `𝓜 : Ḡ`.
+    /// As [`PdBody::add_force_row`], with one weight for the pairwise and stabilising parts (`p`, `q`) and another for the state part `𝓜 : Ḡ`.
     pub fn add_force_row_of_parts(
         &self,
         i: usize,
@@ -275,7 +275,7 @@ impl<const D: usize> PdBody<D> {
         self.add_force_row_of_energies(i, weights, |_| true, row);
     }
 
-    /// As [`PdBody::add_force_row_of_parts`], of a law with a state: what the energies of the points that `counts` names make of it.
+    /// As [`PdBody::add_force_row_of_parts`], of a law with a state: the part due to the energies of the points that `counts` names.
     pub fn add_force_row_of_energies(
         &self,
         i: usize,
@@ -318,7 +318,7 @@ impl<const D: usize> PdBody<D> {
             row.gather(transfer, j, &(-block));
         }
         if let Some(state) = self.state(i) {
-            // a full family has Σ ω ξ V = 0; what is left of it is a surface or a weight that changes in space
+            // Σ ω ξ V vanishes for a full family, but not at a surface or with a weight that varies in space
             if first.amax() > 1e-15 * volume * state.shape.trace() {
                 self.add_weighted_gradient(i, &along(&state.modulus, &first, -1.0), row);
             }

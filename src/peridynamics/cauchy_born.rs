@@ -1,4 +1,4 @@
-//! The Cauchy–Born law of a peridynamic material: what the whole family of a lattice point does under a uniform deformation, as a law of finite elements.
+//! The Cauchy–Born law of a peridynamic material: the stress of the whole family of a lattice point under a uniform deformation, as a law of finite elements.
 //!
 //! ```text
 //! P(F) = Σ T⟨ξ⟩ ⊗ ξ V ,     T the force state of  y(x + ξ) − y(x) = F ξ

@@ -1,7 +1,7 @@
-//! Critical stretch from the fracture energy: the energy of pulling a body apart along a plane, bond by bond.
+//! Critical stretch from the fracture energy: the energy that separates a body along a plane, bond by bond.
 //!
-//! [`plane_energy`] sums over the bonds of the lattice at hand. [`BondEnergy::critical_stretch`] integrates over a continuous family, as papers do: at δ = m h a plane of the lattice then takes 1.25 (1D, m = 2) to 0.83 (2D, m = 2)
-//! and 0.95 to 1.09 (m = 3 to 6, 2D and 3D) of the energy that was typed.
+//! [`plane_energy`] sums over the bonds of the lattice at hand. [`BondEnergy::critical_stretch`] integrates over a continuous family, as papers do: with δ = m h a plane of the lattice then takes 1.25 (1D, m = 2) to 0.83 (2D, m = 2)
+//! and 0.95 to 1.09 (m = 3 to 6, 2D and 3D) of the energy that was given.
 
 use std::f64::consts::PI;
 
@@ -9,10 +9,10 @@ use crate::peridynamics::{Influence, Micromodulus};
 
 /// The bonds of a full, continuous family, as far as breaking them costs energy.
 ///
-/// Units: λ [N/m^(2D+2)] such that the energy of a bond stretched by `s` is `½ λ r⁴ s²` per volume squared, moduli of `D` dimensions \[Pa\].
+/// Units: λ \[N/m^(2D+3)\] such that the energy of a bond stretched by `s` is `½ λ r⁴ s²` per volume squared, moduli of `D` dimensions \[Pa\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BondEnergy {
-    /// Bonds that act alone: λ = constant · shape.
+    /// Pairwise bonds: λ = constant · shape.
     Pairwise {
         /// Shape of λ.
         micromodulus: Micromodulus,
@@ -47,7 +47,7 @@ pub enum FractureError {
         /// The stretch at which bonds that are linear in their extension would.
         linear: f64,
     },
-    /// The state part gives back more than the bonds take.
+    /// The state part releases more energy than the bonds take.
     #[error(
         "opening a plane in this material would release energy ({per_square} J/m² at unit stretch): its Poisson ratio is too far below that of bonds that act alone; give critical-stretch instead, or raise the ratio"
     )]
@@ -158,7 +158,7 @@ fn plane_normal_to<const D: usize>(
 /// The critical stretch at which a plane takes the energy `energy`, if it takes `per_square` at a critical stretch of one.
 ///
 /// # Errors
-/// [`FractureError`] if the energy is not positive or the material gives none back.
+/// [`FractureError`] if the energy is not positive, or if opening the plane releases energy.
 pub fn critical_stretch(energy: f64, per_square: f64) -> Result<f64, FractureError> {
     if !(energy.is_finite() && energy > 0.0) {
         return Err(FractureError::Energy { energy });
@@ -220,7 +220,7 @@ impl BondEnergy {
     /// Units: `energy` \[J/m²\] (J/m of crack and unit thickness in 2D, J per unit section in 1D), `horizon` \[m\].
     ///
     /// # Errors
-    /// [`FractureError`] if the energy is not positive or the material gives none back.
+    /// [`FractureError`] if the energy is not positive, or if opening the plane releases energy.
     pub fn critical_stretch<const D: usize>(
         self,
         energy: f64,

@@ -1,4 +1,4 @@
-//! Families: which points lie within each point's horizon, [SAND2015-7998] eq. (5.2), as the lists (5.6).
+//! Families: the points within each point's horizon, [SAND2015-7998] eq. (5.2), as the lists (5.6).
 //!
 //! The result does not depend on the number of threads. The search itself is in `cell_list.rs`.
 

@@ -46,7 +46,7 @@ pub trait Law<const D: usize>: Send + Sync + std::fmt::Debug {
     /// Its usual name.
     fn name(&self) -> &'static str;
 
-    /// Its derivative at rest, at once.
+    /// Its instantaneous linearisation at rest.
     fn linearised(&self) -> &dyn LinearForceState<D>;
 
     /// The nonlinear response; none for a law that is known to first order only, whose bonds neither rotate nor break.

@@ -1,15 +1,15 @@
 //! The linearisation of a law at rest, for seams, linear statics and preconditioners.
 //!
-//! The linearisation of every law at rest is linear in the relative displacements `η = u(x + ξ) − u(x)`:
+//! To first order in the relative displacements `η = u(x + ξ) − u(x)` every law has the force state \[N/m^(2D)\]
 //!
 //! ```text
 //! T⟨ξ⟩ = p(ξ) ξ (ξ · η)  +  q ω(ξ) η  +  ω(ξ) (𝓜 : Ḡ) ξ ,      Ḡ = Σ ω η ⊗ ξ V
 //! ```
 //!
-//! (and, of a law with [`StatePart::deviator`], `− d [ω B + p |ξ|² tr Ḡ] ξ` with `B = Σ p |ξ|² ξ·η V`):
-//! a pairwise part, an optional stabilising part, and a part through the weighted gradient `Ḡ` of the family. The bond-based material has only the first,
-//! the linear peridynamic solid (LPS) has `𝓜 ∝ I ⊗ I` (its dilatation), correspondence has its stress. One kernel
-//! (`body.rs`) turns these coefficients into rows of the stiffness and into the partial stress for all of them. `T` is the derivative of the energy
+//! with a pairwise part, an optional stabilising part, and a *state part* through the weighted gradient `Ḡ` of the family. A law with [`StatePart::deviator`] adds
+//! `− d [ω B + p |ξ|² tr Ḡ] ξ` with `B = Σ p |ξ|² ξ·η V`. The bond-based material has only the first part.
+//! In the linear peridynamic solid (LPS) `𝓜 ∝ I ⊗ I` stands for the dilatation, in correspondence 𝓜 stands for the stress. For all laws
+//! `body.rs` turns these coefficients into rows of the stiffness and into the partial stress. `T` is the derivative of the energy
 //! density `W = ½ Σ [p (ξ · η)² + q ω η²] V + ½ Ḡ : 𝓜 : Ḡ`, so a body of such points alone has a symmetric stiffness.
 
 use crate::{
@@ -19,7 +19,7 @@ use crate::{
 
 /// One family as a law sees it.
 ///
-/// Shapes: `bonds`, `volumes` and `factors` have one entry per intact bond. Units: ξ \[m\], V \[m^D\], factors \[1\].
+/// Shapes: `bonds`, `volumes` and `factors` have one entry per intact bond. Units: ξ and δ \[m\], V \[m^D\], factors \[1\].
 #[derive(Clone, Copy, Debug)]
 pub struct Family<'a, const D: usize> {
     /// Bond vectors ξ.
@@ -46,21 +46,21 @@ pub struct FamilyMaterials<'a> {
 /// The state part of a law at one point.
 #[derive(Clone, Debug)]
 pub struct StatePart<const D: usize> {
-    /// `𝓜_iakb`, from `Ḡ_kb` to the `(i, a)` component of the tensor that multiplies `ω ξ_a`.
+    /// `𝓜_iakb` \[Pa/m^(2D+4)\], from `Ḡ_kb` to the `(i, a)` component of the tensor that multiplies `ω ξ_a`.
     pub modulus: Tensor4<D>,
-    /// `q`, the weight of the stabilising part.
+    /// `q` \[Pa/m^(D+2)\], the factor of the stabilising part.
     pub stabilisation: f64,
-    /// The strength of a [`crate::peridynamics::ZeroEnergyControl`] that the linearisation does not show: of a length control \[Pa/m^(D+2)\], of a drag that times \[s\].
+    /// The strength of a [`crate::peridynamics::ZeroEnergyControl`] that the linearisation does not show: of a length control \[Pa/m^(D+2)\], of a drag \[Pa s/m^(D+2)\].
     pub control: f64,
     /// `d`, of the products `−d tr Ḡ Σ p |ξ|² ξ·η V` in the energy density: `1/D` for a law whose deviatoric extensions `e − θ |ξ|/D` have another influence function than its dilatation θ, else 0.
     pub deviator: f64,
-    /// `P = Σ p |ξ|² ξ ⊗ ξ V` of such a law, `B = P : ∇u` under an affine field; else 0.
+    /// `P = Σ p |ξ|² ξ ⊗ ξ V` \[Pa\] of such a law, `B = P : ∇u` under an affine field; else 0.
     pub second: Tensor<D>,
-    /// `K = Σ ω ξ ⊗ ξ V`, the shape tensor of the family.
+    /// `K = Σ ω ξ ⊗ ξ V` \[m^(D+2)\], the shape tensor of the family.
     pub shape: Tensor<D>,
 }
 
-/// Conditions on the influence functions of a family that is no lattice's, beside the energy of all affine fields, so that its partial stress is that of elasticity.
+/// Conditions on the influence functions of an irregular family, beside the energy of all affine fields, so that its partial stress is that of elasticity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StressFit {
     /// None; σ is not negative.
@@ -89,7 +89,7 @@ pub trait LinearForceState<const D: usize>: Send + Sync {
     /// Returns the kind of force state.
     fn kind(&self) -> ForceStateKind;
 
-    /// The law with coefficients that make the partial stress exact under affine fields on families that are no lattice's, where [`LinearForceState::coefficients`] does not, and no factors of [`LinearForceState::moment_conditions`] can.
+    /// The law with coefficients that make the partial stress exact under affine fields on irregular families; none where [`LinearForceState::coefficients`], or factors by [`LinearForceState::moment_conditions`], suffice.
     fn fitted_to(&self, stress: StressFit) -> Option<Box<dyn LinearForceState<D> + '_>>;
 
     /// ω of the divergence of a meshfree partial stress beside this law.
@@ -98,7 +98,7 @@ pub trait LinearForceState<const D: usize>: Send + Sync {
     /// The classical elastic tensor that the law is calibrated to \[Pa\].
     fn tensor(&self) -> &Tensor4<D>;
 
-    /// The kernel whose fourth moment the weights of a lattice's shells are to make isotropic, at bond length `r`.
+    /// The kernel, at bond length `r` \[m\], whose fourth moments the weights of the shells of a lattice make isotropic.
     fn kernel(&self, r: f64, horizon: f64) -> f64;
 
     /// Returns the target of the fourth moment of [`LinearForceState::kernel`] on a lattice; `None` if the law needs no correction.
@@ -112,7 +112,7 @@ pub trait LinearForceState<const D: usize>: Send + Sync {
         horizon: f64,
     ) -> Option<(Vec<f64>, MomentConditions<D>)>;
 
-    /// Overwrites `pair` (`p` per bond) and `omega` (`ω` per bond; untouched by a pairwise law) and returns the state part, if the law has one.
+    /// Overwrites `pair` with `p` \[Pa/m^(D+4)\] and `omega` with `ω` \[1\] (untouched by a pairwise law), one entry per bond, and returns the state part, if the law has one.
     ///
     /// # Errors
     /// [`PdError`] if the family is too small or degenerate for the law.
@@ -141,7 +141,7 @@ impl<const D: usize> dyn LinearForceState<D> + '_ {
     }
 }
 
-/// The classical tensor that a family really carries: `ν⁰ = C : G` under `u = G x`.
+/// The collapsed tensor C \[Pa\] of a family: `ν⁰ = C : G` under `u = G x`.
 ///
 /// Source: [SAND2015-7998] eq. (2.10), for the linear force state above:
 /// `C_ijkl = Σ p ξ_i ξ_j ξ_k ξ_l V + q δ_ik K_jl + 𝓜_iakb K_aj K_bl − d (K_ij P_kl + P_ij K_kl)`.

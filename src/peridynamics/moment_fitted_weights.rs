@@ -6,8 +6,8 @@
 //! Σ share Δ²,   share = g |ξ|⁴ V,
 //! ```
 //!
-//! that is, each bond's relative change counts by the share it has in the stiffness. With this norm the factor of a bond depends only
-//! on its direction, a uniform rescaling is free of side effects, and bonds of zero weight keep it.
+//! that is, the relative change of a bond is weighted by its share in the stiffness. With this norm the factor of a bond depends only
+//! on its direction, a uniform change of all factors stays uniform, and bonds of zero weight keep it.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,6 +1,6 @@
-//! Isotropic lattices: one factor per shell of bonds, the smallest change that gives the fourth moments of the typed material.
+//! Isotropic lattices: one factor per shell of bonds, the smallest change that gives the fourth moments of the specified material.
 //!
-//! A lattice sum is not the integral it stands for: a plain lattice of m = δ/h = 3 in 3D has a Zener ratio of 1.25 to 1.33.
+//! A lattice sum differs from the integral that it approximates: a plain lattice of m = δ/h = 3 in 3D has a Zener ratio of 1.25 to 1.33.
 
 use std::collections::BTreeMap;
 

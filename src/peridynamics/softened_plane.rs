@@ -1,4 +1,4 @@
-//! Energy that a crack takes whose bonds soften, of a lattice whose points have a dilatation.
+//! Fracture energy of a lattice of points with a dilatation whose bonds soften.
 //!
 //! A bond that softens releases energy of the dilatations that it shares, and a dilatation follows the strain along the crack as well: the energy of a bond depends on the path. The path here is that of points about the tip of a
 //! long crack in a plane. Two half-spaces are separated along a plane by the opening Δ, both strained as the traction T between them strains the body,

@@ -9,16 +9,16 @@
 //! v_{n+1}   = v_{n+1/2} + Δt/2 a_{n+1}
 //! ```
 //!
-//! A prescribed dof follows its displacement `g(t)` exactly, with `v_n = (g_{n+1} − g_{n−1}) / 2Δt` and `a_n = (g_{n+1} − 2 g_n + g_{n−1}) / Δt²`, so that the scheme
-//! above holds for it too, and the force that moves it is `M a + F`. Therefore the work of all external forces, supports included,
-//! balances the discrete energy `½ v_{n+1/2}ᵀ M v_{n+1/2} + ½ u_nᵀ K u_{n+1}` of a linear symmetric system to round-off:
+//! A prescribed degree of freedom (dof) follows its displacement `g(t)` exactly, with `v_n = (g_{n+1} − g_{n−1}) / 2Δt` and `a_n = (g_{n+1} − 2 g_n + g_{n−1}) / Δt²`. The scheme
+//! above then holds for it too, with the total external force `M a + F` of load and support. The work of all external forces therefore
+//! balances the discrete energy `H_{n+1/2} = ½ v_{n+1/2}ᵀ M v_{n+1/2} + ½ u_nᵀ K u_{n+1}` of a linear symmetric system to round-off:
 //!
 //! ```text
 //! H_{n+1/2} − H_{n−1/2} = ½ (u_{n+1} − u_{n−1})ᵀ f_n
 //! ```
 //!
-//! Vectors run over chunks of fixed size and sums are added in the order of the chunks; the work is an exact sum. The bits depend neither on the number of threads
-//! nor, where processes move their own sites alone (`shared.rs`), on that of processes.
+//! Loops over sites run in chunks of fixed size, whose sums are added in their order; the work is summed exactly. No bit of a state depends on the number of threads
+//! or, where each process moves its own sites (`shared.rs`), on that of processes.
 
 use std::ops::{ControlFlow, Range};
 
@@ -39,7 +39,7 @@ use sums::{Sums, total};
 /// Sites per chunk: the chunks, not the threads, decide the order of sums.
 const SITES: usize = 1024;
 
-/// A motion under way.
+/// A motion in progress.
 pub struct Explicit<'a> {
     system: &'a mut dyn SemiDiscrete,
     drive: &'a dyn Drive,
@@ -48,9 +48,9 @@ pub struct Explicit<'a> {
     energies: Energies,
     block: usize,
     inverse_mass: Vec<f64>,
-    /// Internal force at `n`.
+    /// Internal force \[N\] at `n`, `block` entries per site.
     force: Vec<f64>,
-    /// External force at `n`; on prescribed dofs all that moves them.
+    /// External force \[N\] at `n`; on prescribed dofs that of load and support.
     load: Vec<f64>,
     prescribed: Vec<u32>,
     /// The load alone on prescribed dofs.
@@ -68,7 +68,7 @@ pub struct Explicit<'a> {
 }
 
 impl<'a> Explicit<'a> {
-    /// Starts or resumes a motion: a state with accelerations is taken up as it stands, one without gets them from the system.
+    /// Starts or resumes a motion: a state with accelerations is resumed as it is, one without gets them from the system.
     ///
     /// The damage of a resumed run must have been put back into the system before.
     ///
@@ -111,7 +111,7 @@ impl<'a> Explicit<'a> {
             system.account_for_breaks(&Halfway::at(&state.u));
         }
         if starts {
-            // what a resumed system remembers is committed: to respond to it once more changes it by rounding
+            // the history of a resumed system is committed already: to evaluate it once more would change it by rounding
             system.commit();
         }
         state.broken += changes.broken;
@@ -164,12 +164,12 @@ impl<'a> Explicit<'a> {
         self.look_ahead();
         for (&k, next) in self.prescribed.iter().zip(&self.next) {
             let k = k as usize;
-            // so that the first half step arrives where the prescribed motion is
+            // the first step then arrives at the prescribed displacement
             self.state.a[k] = 2.0 * ((next - self.state.u[k]) / dt - self.state.v[k]) / dt;
         }
     }
 
-    /// Kinetic energy \[J\] of velocities that rounding of the displacements makes: a body that begins at rest in an expanded state has no other.
+    /// Kinetic energy \[J\] of the velocities due to rounding of the displacements: the only energy of a body that starts at rest in an expanded state.
     fn energy_of_rounding(&self) -> f64 {
         /// Relative error of a displacement after many sums.
         const ROUNDING: f64 = 1e-12;
@@ -194,7 +194,7 @@ impl<'a> Explicit<'a> {
         }
     }
 
-    /// On prescribed dofs, the load becomes all that moves them, `M a + F`.
+    /// Sets the load on prescribed dofs to the total external force, `M a + F`.
     fn add_reactions(&mut self, reading: Reading) {
         for (p, &k) in self.prescribed.iter().enumerate() {
             let k = k as usize;
@@ -220,7 +220,7 @@ impl<'a> Explicit<'a> {
         }
     }
 
-    /// `½ vᵀ M v`, in the order of the steps.
+    /// `½ vᵀ M v` \[J\], summed chunk by chunk as in a step.
     fn kinetic(&self) -> f64 {
         let d = self.block;
         let sums: Vec<f64> = self
@@ -239,7 +239,7 @@ impl<'a> Explicit<'a> {
         0.5 * sums.iter().sum::<f64>()
     }
 
-    /// Takes one step, in buffers that the solver and the system keep.
+    /// Takes one step, in buffers kept from step to step.
     ///
     /// # Errors
     /// [`ExplicitError::NotFinite`] or [`ExplicitError::Runaway`], with step, time and site.
@@ -292,7 +292,7 @@ impl<'a> Explicit<'a> {
         self.check_numbers()
     }
 
-    /// The internal force at the displacement that was reached, with the bonds that it broke.
+    /// Computes the internal force at the new displacement; returns the bonds that it broke.
     fn respond(&mut self) -> shared::Outcome {
         if self.shared.is_some() {
             return self.respond_at_own();
@@ -423,7 +423,7 @@ impl<'a> Explicit<'a> {
                 site: dof / self.block,
             });
         }
-        // at n − ½, which the work of the step before has paid for: a load that begins at zero has done none when it first accelerates
+        // at n − ½, since a load that starts from zero has done no work yet when it first accelerates the body
         if kinetic_half > self.params.runaway * self.state.supplied {
             return Err(ExplicitError::Runaway {
                 step,

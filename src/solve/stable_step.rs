@@ -1,19 +1,18 @@
-//! The stable step of velocity Verlet, and the instability of a model at any step.
+//! The stable step of velocity Verlet.
 //!
-//! A mode with `K w = λ M w` is stepped by `w_{n+1} − 2 w_n + w_{n−1} = −Δt² λ w_n`, which is bounded if and only if λ is real and `0 ≤ λ ≤ 4/Δt²`.
-//! So there are two questions. How large is the largest λ? And, where `K` is not symmetric, is any λ negative or complex? Such a mode grows as
-//! `exp(σ t)`, `σ = |Re √(−λ)|`, whatever the step.
+//! A mode with `K w = λ M w` is stepped by `w_{n+1} − 2 w_n + w_{n−1} = −Δt² λ w_n`, which does not grow exponentially if and only if λ is real and `0 ≤ λ ≤ 4/Δt²`.
+//! The stable step follows from an upper bound of λ \[1/s²\]. There are two:
 //!
 //! * **Certified**: `λ ≤ max_a Σ_b |K_ab| / m_a` (Gershgorin), valid for any `K`.
 //! * **Sharp**: the largest Ritz value θ of Lanczos (symmetric) or Arnoldi in the inner product of the masses, from a random start. With
 //!   `k` products on `n` unknowns `λ ≤ θ/(1 − ε)` fails with a probability of at most `1.648 √n exp(−√ε (2k − 1))` (\[Kuczynski1992\], theorem 3, symmetric);
-//!   `ε` is [`MARGIN`], and `k` is chosen for one in 10⁹. Without symmetry there is no such theorem and the same margin is kept.
+//!   `ε` is [`MARGIN`], and `k` makes the probability 10⁻⁹. Without symmetry there is no such theorem, and the same margin is kept.
 //!
-//! A drag, `M ü + C v̄ + K u = f` with the velocity `v̄` of the step before, has the energy of `M − Δt C/2 − Δt² K/4`: with the bound Γ of [`RateBounds::drag`] the step is stable while `ω² Δt² + 2 Γ Δt < 4`.
+//! A drag, `M ü + C v̄ + K u = f` with `v̄ = (u_n − u_{n−1})/Δt`, has the energy of `M − Δt C/2 − Δt² K/4`: with the bound Γ of [`RateBounds::drag`] the step is stable while `λ Δt² + 2 Γ Δt < 4`.
 //!
-//! Contact is not in the tangent at rest: what it may add to λ at most ([`RateBounds::stiffness`]) is added to both bounds.
+//! Contact is not in the tangent at rest. The row sums of the certified bound contain a bound of its stiffness; the sharp bound adds [`RateBounds::stiffness`].
 //!
-//! The second question is that of [`crate::solve::instability_growth`].
+//! If `K` is not symmetric, λ may be negative or complex. Such a mode grows at any step, see [`crate::solve::instability_growth`].
 
 use crate::{
     solve::{
@@ -23,13 +22,13 @@ use crate::{
     system::{RateBounds, SemiDiscrete, Symmetry},
 };
 
-/// `ε`: the largest eigenvalue is taken to be `1/(1 − ε)` times the largest Ritz value, which costs 2 % of the step.
+/// `ε` of the sharp bound `λ ≤ θ/(1 − ε)`, which costs 2 % of the step.
 pub const MARGIN: f64 = 0.04;
 
 /// Probability with which the sharp bound of a symmetric model may fail.
 const FAILURE: f64 = 1e-9;
 
-/// Products between two tests if a step may stay.
+/// Products with the stiffness between two tests whether a held step may stay.
 const ASKED: usize = 2;
 
 /// Basis vectors of Arnoldi may take this many bytes.
@@ -42,9 +41,9 @@ pub struct StepLimit {
     pub certified: f64,
     /// The site of the largest row sum over mass.
     pub certified_site: usize,
-    /// `2/√θ` of the largest Ritz value: the true limit, or a little above.
+    /// The limit by the largest Ritz value θ without a margin, `2/√θ` if there are neither contact nor drag: the true limit, or a little above.
     pub estimate: f64,
-    /// The step to take: the larger of the certified one and the estimate less its margin.
+    /// The step to take: the larger of the certified step and that of the sharp bound.
     pub stable: f64,
     /// Products with the stiffness that it took.
     pub products: usize,
@@ -197,7 +196,7 @@ impl<'a> Scaled<'a> {
     }
 }
 
-/// Normally distributed numbers (splitmix64, Box and Muller): the direction of such a vector is uniform, as the bound on Lanczos wants it.
+/// Normally distributed numbers (splitmix64, Box and Muller): the direction of such a vector is uniform, as the bound for Lanczos requires.
 fn normal_numbers(count: usize) -> Vec<f64> {
     let mut state = 0x0b0d_11e5_u64;
     let mut uniform = || {
@@ -215,7 +214,7 @@ fn normal_numbers(count: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The limits of the time step; `prescribed` lists the dofs that are not free.
+/// The limits of the time step of a system at rest; `prescribed` lists the dofs that are not free.
 ///
 /// # Errors
 /// [`StepError::Row`] for a site without mass or a row that is not finite, [`StepError::Eigenvalues`].
@@ -224,19 +223,19 @@ pub fn stable_step(system: &dyn SemiDiscrete, prescribed: &[u32]) -> Result<Step
     Ok(rayon::scope(|_| limits(system, prescribed, None))?.0)
 }
 
-/// A step that a model has taken and that may stay after a change of what moves.
+/// A step in use that may stay after a change of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Held {
     /// The step \[s\].
     pub step: f64,
-    /// Largest part of the stable step that it may be.
+    /// Largest fraction of the stable step that it may be.
     pub fraction: f64,
 }
 
-/// As [`stable_step`], with no more products than it takes to see that a step may stay: fewer than for the sharpest bound, since a step at a fraction of the limit leaves a wider margin.
+/// As [`stable_step`], but stops as soon as a held step is known to be stable: a step at a fraction of the limit leaves a wider margin, which takes fewer products.
 ///
-/// It may stay if it is within the bound that the products so far give, which fails as rarely at each of the some ten looks as that of [`stable_step`] does once, and within the fraction of the stable step as they estimate it. [`StepLimit::stable`] is that bound then.
-/// Models without symmetry take all products. Returns the limits, and whether the step may stay.
+/// After every few products the step is compared with the bound that they give, which fails with the probability of that of [`stable_step`] at each of about ten tests, and with its fraction of the stable step as they estimate it. If it may stay, [`StepLimit::stable`] is that bound.
+/// Unsymmetric models take all products. Returns the limits, and true if the step may stay.
 ///
 /// # Errors
 /// As [`stable_step`].
@@ -269,7 +268,7 @@ fn limits(
         stiffness: hidden,
         drag,
     } = system.rate_bounds();
-    // a force against the velocity of half a step before: stable while ω² Δt² + 2 Γ Δt < 4
+    // with the velocity half a step before a drag is stable while λ Δt² + 2 Γ Δt < 4
     let step_of = |square: f64| match drag > 0.0 {
         true => 4.0 / (drag + (drag * drag + 4.0 * square).sqrt()),
         false => 2.0 / square.sqrt(),
@@ -299,7 +298,7 @@ fn limits(
         certified_site,
         // a Ritz value may exceed the bound on eigenvalues by rounding
         estimate: estimate.max(certified),
-        // where the row sum is the eigenvalue, rounding must not decide
+        // where the row sum equals the eigenvalue, rounding must not decide
         stable: certified.max(sharp) * (1.0 - 1e-9),
         products: operator.products,
     };
@@ -307,7 +306,7 @@ fn limits(
     Ok((limit, stays || stays_early))
 }
 
-/// `2/√θ` after a few products: a little above the limit, where that matters little.
+/// `2/√θ` after a few products \[s\], without contact and drag: a rough estimate, above the limit.
 pub(super) fn rough_limit(
     system: &dyn SemiDiscrete,
     prescribed: &[u32],
@@ -355,13 +354,13 @@ impl StepLimit {
     }
 }
 
-/// Products that make the sharp bound fail once in 1/[`FAILURE`] symmetric models.
+/// Number of products with which the sharp bound of a symmetric model fails with the probability [`FAILURE`].
 fn products_for(unknowns: usize) -> usize {
     let needed = (1.648 * (unknowns.max(1) as f64).sqrt() / FAILURE).ln() / MARGIN.sqrt();
     (0.5 * (needed + 1.0)).ceil() as usize
 }
 
-/// The margin with which the bound of a symmetric model holds after so many products, as rarely wrong as [`FAILURE`] says.
+/// The margin with which the sharp bound of a symmetric model fails with the probability [`FAILURE`] after so many products.
 fn margin_of(unknowns: usize, products: usize) -> f64 {
     let needed = (1.648 * (unknowns.max(1) as f64).sqrt() / FAILURE).ln();
     (needed / (2.0 * products as f64 - 1.0)).powi(2)
@@ -374,7 +373,7 @@ enum Want {
     Mode,
 }
 
-/// The largest Ritz value in size, and its vector if that is wanted; of a symmetric model with fewer products where `is_enough` says so.
+/// The largest Ritz value, of an unsymmetric model in absolute value, and its vector if that is wanted; of a symmetric model with fewer products if `is_enough` returns true.
 fn highest(
     operator: &mut Scaled<'_>,
     want: Want,
@@ -402,10 +401,10 @@ fn highest(
     }
 }
 
-/// Lanczos with three vectors; the basis is gone through a second time for the vector, if that is wanted.
+/// Lanczos with three vectors; the recurrence is run a second time for the Ritz vector, if that is wanted.
 ///
-/// Vectors lose their orthogonality once a Ritz value has converged, which repeats that value and spoils none; to keep them orthogonal would
-/// cost more than the products. It ends before `count` products where `is_enough`, asked every [`ASKED`] of them with the largest Ritz value and their number, says so.
+/// The vectors lose their orthogonality once a Ritz value has converged. This repeats the value and leaves the others correct; reorthogonalisation would
+/// cost more than the products. It ends before `count` products if `is_enough`, called every [`ASKED`] of them with the largest Ritz value and their number, returns true.
 fn lanczos(
     operator: &mut Scaled<'_>,
     count: usize,

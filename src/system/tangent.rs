@@ -13,7 +13,7 @@ pub trait Tangent {
     /// are linear, so that the tangent at rest is that at any displacement.
     fn difference_length(&self) -> Option<f64>;
 
-    /// For every unknown an upper bound of `Σ_b |K_ab|`, with the tangent at rest.
+    /// For every unknown an upper bound of `Σ_b |K_ab|` \[N/m\], with the tangent at rest and, on top of it, contact.
     fn row_sums(&self) -> Vec<f64>;
 
     /// Returns true for each site whose tangent, its row and its column, never changes; false for all if the system does not know.

@@ -5,7 +5,7 @@ use super::{Interval, SpringRows};
 /// Upper bounds of the part that a term, or all forces of a system, may add to the eigenvalues of the motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RateBounds {
-    /// Of `M⁻¹ K` that rest does not show \[1/s²\]: contact.
+    /// Of `M⁻¹ K`, by forces that are not in the tangent at rest \[1/s²\]: contact.
     pub stiffness: f64,
     /// Of `M⁻¹ C` of forces `C v` against the velocities of the interval \[1/s\].
     pub drag: f64,
@@ -26,7 +26,7 @@ pub trait ForceTerm: Send + Sync {
     /// Its tangent at rest; none if it vanishes there.
     fn rows(&self) -> Option<&SpringRows>;
 
-    /// Adds an upper bound of `Σ_b |K_ab|` of its tangent at rest to the `sums` of the body's unknowns, and appends those of its own.
+    /// Adds an upper bound of `Σ_b |K_ab|`, contact included, to the `sums` of the body's unknowns, and appends those of its own.
     fn add_row_sums(&self, sums: &mut Vec<f64>);
 
     /// The displacement \[m\] over which its force is differenced where its tangent is wanted; none for a force that is linear in the displacement.

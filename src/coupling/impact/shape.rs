@@ -1,8 +1,8 @@
-//! The shape of a rigid impactor: how deep a place lies inside, and which way leads out.
+//! The shape of a rigid impactor: depth of a position inside it, and the shortest direction out.
 
 use crate::tensor::Vector;
 
-/// A rigid body that pushes out what comes inside.
+/// Shape of a rigid impactor.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ImpactorShape<const D: usize> {
     /// A sphere; a disc in two dimensions, an interval in one.

@@ -26,7 +26,7 @@ pub struct BondBehaviour<'a, const D: usize> {
     pub kinematics: BondKinematics,
     /// Threshold at which bonds break; none if nothing breaks them.
     pub failure: Option<BondThreshold>,
-    /// Softening of bonds up to their end, with the energy of a break at the threshold, a stretch; none for bonds that break at once.
+    /// Softening of bonds, with the energy of a break at the threshold, which is then a stretch; none for bonds that break at once.
     pub softening: Option<BondSoftening>,
     /// Region where bonds never break.
     pub no_fail: &'a (dyn Fn(&Vector<D>) -> bool + Sync),
@@ -34,7 +34,7 @@ pub struct BondBehaviour<'a, const D: usize> {
     pub contact: Option<ContactBehaviour>,
     /// Storage of the weights of bonds; in four bytes, they are listed one by one.
     pub storage: Storage,
-    /// By how much points expand freely; none if nothing does, or if all bonds are linear and expand by their rows.
+    /// Free thermal stretch of points; none if nothing expands, or if all bonds are linear and expand by their rows.
     pub heat: Option<FreeStretch<D>>,
     /// Bonds that are broken from the start, in a motion that goes on from another layout.
     pub broken: Option<&'a BrokenBonds<D>>,

@@ -39,7 +39,7 @@ pub(super) struct MovingBody<const D: usize> {
     pub contact: Option<Mutex<Contact<D>>>,
     /// The site of each point; `NONE` for a point that follows sites.
     pub site_of_point: Vec<u32>,
-    /// All points follow this many sites later, if they do.
+    /// The constant difference between the numbers of points and of their sites, if there is one.
     pub shift: Option<usize>,
     /// Interpolation from the sites to points that are none; none where no bond and no contact needs it.
     pub transfer: Option<Transfer>,
@@ -51,7 +51,7 @@ pub(super) struct MovingBody<const D: usize> {
     pub feet: Vec<u32>,
     /// Sites whose row is that of the body alone.
     pub alone: usize,
-    /// Points at the edge of the region where bonds can break, none if nothing can.
+    /// Points at the edge of the region where bonds can break; empty if none can, or if the seam reports damage itself.
     pub edge: Vec<u32>,
     pub displacement: Vec<f64>,
     pub force: Vec<f64>,

@@ -1,4 +1,4 @@
-//! Energy of the finite elements of a moving model, from rows that are there already where they are those of elements alone.
+//! Energy of the finite elements of a moving model, by existing rows where these are those of elements alone.
 
 use super::rows::{SiteRows, row_product};
 use crate::coupling::semidiscrete::behaviour::CHUNK;

@@ -1,4 +1,4 @@
-//! Bonds that know their temperature: all but those that break or bend are linear, and expand by their rows.
+//! Thermal expansion of bonds that break or rotate; all other bonds are linear, and expand by their rows.
 
 use super::behaviour::{FreeStretch, SystemError};
 use crate::{

@@ -1,4 +1,4 @@
-//! Forces of a coupled system whose bonds know their temperature.
+//! Forces of a coupled system whose bonds expand with the temperature.
 
 use super::CoupledSystem;
 use crate::{

@@ -1,4 +1,4 @@
-//! Steps in which each process moves its own sites: bodies whose forces come from linear rows and from bonds.
+//! Steps in which each process moves its own sites, for bodies whose forces come from linear rows and from bonds.
 //!
 //! The force on a site takes the displacements of the columns of its row and of its neighbours, of a state-based law also those of their neighbours, for its dilatations; points between elements take those of the sites that
 //! they follow. These sites are the ghosts. Forces of own sites that others have as ghosts are computed first, and travel while the others are. Bonds that break are reported to all once they are asked for.

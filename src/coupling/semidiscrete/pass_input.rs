@@ -173,7 +173,7 @@ pub(super) fn edge_of<const D: usize>(body: &PdBody<D>, own_row: &[bool]) -> Vec
         .collect()
 }
 
-/// By how many sites all points are later, if they all are.
+/// The constant difference between the numbers of points and of their sites, if there is one.
 pub(super) fn shift_of(site_of_point: &[u32]) -> Option<usize> {
     let first = site_of_point.first().copied().unwrap_or(0);
     site_of_point
@@ -184,7 +184,7 @@ pub(super) fn shift_of(site_of_point: &[u32]) -> Option<usize> {
         .then_some(first as usize)
 }
 
-/// Which points are sites, and which rows are those of the body.
+/// Sites of the points, and points whose row is that of the body.
 pub(super) struct PointSites {
     pub site_of_point: Vec<u32>,
     pub bonds_of_site: Vec<u32>,

@@ -1,4 +1,4 @@
-//! Which sites the forces of some others look at.
+//! Sites on whose displacements the forces of others depend.
 
 use super::CoupledSystem;
 use super::behaviour::NONE;

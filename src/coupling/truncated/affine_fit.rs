@@ -1,9 +1,9 @@
 //! Seams whose faces cut the lattice anywhere: factors for the energies of pieces, and shares of dilatations, that make affine fields exact again.
 //!
-//! A piece keeps its form, `c s w(ξ, D/s)` with a factor `c`, and so do the whole bonds between the points that have pieces. Under `u = G x` it pulls with `c` times the force of the whole bond,
+//! A piece keeps its form, `c s w(ξ, Δu/s)` with a factor `c`, and so do the whole bonds between the points that have pieces. Under `u = G x` it pulls with `c` times the force of the whole bond,
 //! so equilibrium at every site is linear in the factors: the sums of `c k ξ⊗ξ⊗ξ` over the ends at a point vanish, those at a node, weighted with its shape function, equal the traction of the lattice times
 //! the integral of the shape function. These are D (D+1) (D+2)/6 conditions per site (the third-order tensor is symmetric). Of all factors that meet them, and stay above a floor so that every energy is positive, those nearest
-//! to 1 are taken. What a piece hands to the dilatations of an LPS is changed in the same way, without a floor: every point's dilatation is tr G, every element's a multiple of it, and their pressures balance
+//! to 1 are taken. What a piece contributes to the dilatations of an LPS is changed in the same way, without a floor: every point's dilatation is tr G, every element's a multiple of it, and their pressures balance
 //! at every site.
 //!
 //! If the seam follows the lattice nothing is missing, and nothing is changed.
@@ -21,7 +21,7 @@ use crate::coupling::truncated::fit_parts::{
 use crate::coupling::truncated::lps_constants::state_of;
 use crate::{model::ModelError, peridynamics::StatePart, tensor::Vector};
 
-/// Largest factor of an energy for which it is shown that none helps.
+/// Largest factor of an energy that [`SeamConditions::out_of_reach`] considers.
 const MOST_FACTOR: f64 = 1e3;
 
 /// Missing force on a node, relative to the largest traction of a face, below which a seam follows the lattice.
@@ -44,7 +44,7 @@ pub struct SeamConditions {
     pub out_of_reach: f64,
 }
 
-/// Looks at the conditions of the pairwise part.
+/// Returns the conditions of the pairwise part.
 pub(super) fn conditions<const D: usize>(segments: &mut Segments<'_, D>) -> SeamConditions {
     let Missing { missing, .. } = missing(segments);
     segments.widen();
@@ -102,7 +102,7 @@ fn missing<const D: usize>(segments: &Segments<'_, D>) -> Missing<D> {
     }
 }
 
-/// Fits the seam unless it follows the lattice; returns whether it did.
+/// Fits the seam unless it follows the lattice; returns true if it has.
 ///
 /// # Errors
 /// [`ModelError::Seam`] with what is left if no positive factors meet the conditions, [`ModelError::SeamTooLarge`] if they are too many.
@@ -126,7 +126,7 @@ pub(super) fn fit<const D: usize>(
     // the faces of a zone with a rim of its own are those of lattice cells; what is missing there is the surface of the body
     let follows = segments.model.mesh.embedded.has_patch() || follows(&missing);
     if state.is_some_and(|s| s.deviator != 0.0) {
-        // factors, and shares of one dilatation, are not those of two
+        // the fit is for a law with one dilatation
         return match follows {
             true => Ok(false),
             false => Err(ModelError::TwoDilatations),
@@ -214,7 +214,7 @@ fn pair_conditions<const D: usize>(
     (conditions, target)
 }
 
-/// The rows of the conditions on what parts hand to dilatations.
+/// The rows of the conditions on the contributions of parts to dilatations.
 struct StateRows {
     /// The second moments of each point.
     points: FxHashMap<u32, usize>,
@@ -224,7 +224,7 @@ struct StateRows {
     cells: FxHashMap<u32, usize>,
     /// Nodes, ascending.
     order: Vec<u32>,
-    /// Rows from this one on ask for more than what is there.
+    /// First row whose target is not zero: those of nodes and elements.
     closed: usize,
     count: usize,
 }
@@ -271,9 +271,9 @@ impl StateRows {
     }
 }
 
-/// Changes what parts hand to dilatations; returns what is left, relative.
+/// Changes the contributions of parts to dilatations; returns the largest relative residual.
 ///
-/// Conditions: the second moments of what a point is handed stay as they are, those of an element become isotropic; the forces of a uniform pressure on a point stay in balance, those on a node become its share of the
+/// Conditions: the second moments of the contributions to a point keep their values, those to an element become isotropic. The forces of a uniform pressure on a point stay in balance; those on a node become its share of the
 /// pressure of the zone. Moments are per volume of a cell of the lattice, forces per area of its face, so that all are of the size of 1.
 fn state_change<const D: usize>(
     segments: &mut Segments<'_, D>,

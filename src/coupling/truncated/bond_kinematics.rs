@@ -1,4 +1,4 @@
-//! A part of a bond as it turns and stretches: a piece, or a whole bond of a point at the seam.
+//! Kinematics of a part of a bond: a piece, or a whole bond of a point at the seam.
 
 use super::bond_segments::Segments;
 use crate::{
@@ -10,9 +10,9 @@ use crate::{
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part<const D: usize> {
     pub xi: [f64; D],
-    /// `k/s`, of the energy `½ (k/s) (ξ·D)²` at rest.
+    /// `k/s`, of the energy `½ (k/s) (ξ·Δu)²` at rest.
     pub stiffness: f64,
-    /// s.
+    /// s, as a fraction of the bond.
     pub length: f64,
     pub bond: u32,
 }

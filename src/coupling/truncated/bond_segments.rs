@@ -1,4 +1,4 @@
-//! The pieces of bonds inside of the peridynamic zone: their ends, their stiffness, and what they hand to dilatations.
+//! The pieces of bonds inside of the peridynamic zone: their ends, their stiffness, and their contributions to dilatations.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -43,7 +43,7 @@ pub(super) struct Changed {
     pub hands: [f64; 2],
 }
 
-/// Which bonds are whole, and the pieces of those that are not.
+/// Whole bonds, and the pieces of all others.
 #[derive(Clone)]
 pub(super) struct Segments<'a, const D: usize> {
     pub model: &'a Model<D>,
@@ -53,7 +53,7 @@ pub(super) struct Segments<'a, const D: usize> {
     pub site: Vec<u32>,
     /// Pieces of bonds that leave the zone or pass through it.
     pub cut: Vec<Segment>,
-    /// Bonds between points of the zone that are not whole, lower number first.
+    /// Bonds between points of the zone that leave it in between, lower number first.
     pub broken: FxHashSet<(u32, u32)>,
     /// For each point, true if it has a bond that is not whole, or one that a fit has changed.
     pub at_seam: Vec<bool>,
@@ -128,7 +128,7 @@ impl<'a, const D: usize> Segments<'a, D> {
         }
     }
 
-    /// Counts the neighbours of the points at the seam as at the seam.
+    /// Adds the neighbours of the points at the seam to these.
     pub fn widen(&mut self) -> bool {
         let wide = self.with_neighbours();
         let changes = wide != self.at_seam;
@@ -318,8 +318,8 @@ impl<const D: usize> Ends<'_, D> {
 
 /// Returns the factors of a piece's elongation in the dilatations at its ends.
 ///
-/// The two add up to 2, so a uniform pressure pulls at it as at the whole bond; over the pieces of parallel bonds of a lattice the surplus of the long ones makes up for the deficit of the short ones, so that an
-/// affine field has its own dilatation everywhere.
+/// The two add up to 2, so a uniform pressure acts on it as on the whole bond. Over the pieces of parallel bonds of a lattice the surplus of the long ones cancels the deficit of the short ones, so that the dilatation of
+/// an affine field is exact everywhere.
 fn hands_of(piece: &Piece) -> [f64; 2] {
     let length = piece.to - piece.from;
     [

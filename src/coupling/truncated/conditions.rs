@@ -1,15 +1,15 @@
 //! Conditions on changes of a seam, as a sparse matrix.
 
-/// And times the conditions, each of which costs an iteration more the more there are: 57 630 beside a ball in space take 0.6 s each.
+/// Most iterations with factors, times the number of conditions: the cost of an iteration grows with it, to 0.6 s at 57 630 conditions.
 const MOST_LED_CONDITIONS: usize = 10_000_000;
 
-/// The same where nothing else is left to try: 64 192 beside a ring of quadrilaterals take 250.
+/// The same in the last attempt: 64 192 conditions have needed 250 iterations.
 const MOST_LED_LAST: usize = 50_000_000;
 
-/// Iterations of the search for what bounded changes cannot reach.
+/// Most iterations of the search for the residual that bounded changes cannot remove.
 const MOST_GRADIENTS: usize = 20_000;
 
-/// That search ends when its bound is this near to what it has reached.
+/// That search ends when its lower bound is this fraction of the residual.
 const CLOSED: f64 = 0.98;
 
 /// Conditions on changes, one column per change.
@@ -19,9 +19,9 @@ pub(super) struct Conditions {
     pub(super) offsets: Vec<usize>,
     pub(super) rows: Vec<u32>,
     pub(super) values: Vec<f64>,
-    /// From this column on changes have no floor.
+    /// First column whose change has no floor.
     pub(super) free: usize,
-    /// Iterations with factors times conditions.
+    /// Most iterations with factors, times the number of conditions.
     pub(super) most_led: usize,
 }
 
@@ -38,12 +38,12 @@ impl Conditions {
         }
     }
 
-    /// Lets the columns that follow be without a floor.
+    /// Sets all columns that follow to have no floor.
     pub fn free_from_here(&mut self) {
         self.free = self.changes();
     }
 
-    /// Lets a search go on for longer, since it is the last one.
+    /// Allows a longer search, in the last attempt.
     pub fn last(&mut self) {
         self.most_led = MOST_LED_LAST;
     }

@@ -5,10 +5,10 @@
 //! is an octopole: under `u = G x` the force
 //!
 //! ```text
-//! R_i = ± q (G_kl + G_lk) ,   i, k, l distinct,   q = 4 h³ Σ_{a,b,c>0} D(a,b,c) k(a,b,c) a b c
+//! R_i = ± q (G_jl + G_lj) ,   i, j, l distinct,   q = 4 h³ Σ_{a,b,c>0} X(a,b,c) k(a,b,c) a b c
 //! ```
 //!
-//! on the corner's node, with the sign of the product of the three outward normals. It adds up to zero over the zone, but not at any corner, so nothing at a corner alone can balance it. The energy
+//! on the corner's node, with the sign of the product of the three outward normals, the stiffness k of a bond with the energy `½ k (ξ·η)²`, and X of `excess`. It adds up to zero over the zone, but not at any corner, so nothing at a corner alone can balance it. The energy
 //!
 //! ```text
 //! − q ∫ (∂_s u · n₁)(∂_s u · n₂) ds
@@ -216,7 +216,7 @@ fn octopole<const D: usize>(whole: &WholeFamily<D>, shift: f64) -> f64 {
     q
 }
 
-/// `D`: the sum of a corner's shape function over the ends of all bonds `k` that leave an octant, less its integral over the three faces, whose ends have the density `k`.
+/// X: the sum of a corner's shape function over the ends of all bonds with the offset `k` that leave an octant, less its integral over the three faces, whose ends have the density `k`.
 fn excess<const D: usize>(k: &[i32; D], shift: f64) -> f64 {
     let mut sum = 0.0;
     let counts: [i32; D] = std::array::from_fn(|i| k[i] + 2);

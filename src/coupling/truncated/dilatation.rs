@@ -1,12 +1,12 @@
 //! Dilatations of an LPS at the seam: those of points and of the elements behind the faces.
 //!
-//! A position-aware solid has two, θ by the influence function ω and θ_σ by σ, with `S = 2 μ Σ σ |ξ|² V` and `B = S θ_σ/D`. What its energy has beside that of its pairs is
+//! A position-aware solid has two, θ by the influence function ω and θ_σ by σ, with `S = 2 μ Σ σ |ξ|² V` and `B = S θ_σ/D`. Its energy beyond that of its pairs is, with the scalar 𝓜 of its state part,
 //!
 //! ```text
 //! ½ 𝓜 θ² − θ B/D  =  ½ κ θ² + ½ c (θ − θ_σ)² − ½ c θ_σ² ,     c = S/D² ,
 //! ```
 //!
-//! of a whole family `c = (D + 2) μ/D`, so that an affine field has the pressure `K′ θ` of an LPS, `K′ = κ − c`. Pieces hand to each as to that of an LPS.
+//! In a whole family `c = (D + 2) μ/D`, so that an affine field has the pressure `K′ θ` of an LPS, `K′ = κ − c`. Pieces contribute to each dilatation as to that of an LPS.
 
 use std::collections::BTreeMap;
 
@@ -27,12 +27,12 @@ pub(super) struct Dilatations<const D: usize> {
     stiffness: Vec<f64>,
     offsets: Vec<usize>,
     entries: Vec<(u32, Vector<D>)>,
-    /// Those that only take back what an element's own energy has already.
+    /// True for those that only subtract what an element's own energy contains already.
     taken_back: Vec<bool>,
     of_site: BySite,
 }
 
-/// A functional as it grows: entries by site.
+/// Coefficients b of a functional `Σ b·u`, by site.
 pub(super) type Functional<const D: usize> = BTreeMap<u32, Vector<D>>;
 
 /// Returns the contribution of a share of a piece's elongation to the volume that an element counts as its own: points on a face have half of their cells in the zone, the element carries their dilatation too.
@@ -74,7 +74,7 @@ impl<const D: usize> Dilatations<D> {
 
     /// The dilatations of the elements behind faces, and of all points that `listed` or whose neighbours it names.
     ///
-    /// Each piece hands its share, `Segment::hands`, of its elongation to the dilatations at its ends.
+    /// Each piece contributes its elongation, times `Segment::hands`, to the dilatations at its ends.
     pub fn new(segments: &Segments<'_, D>, common: &LpsConstants, listed: &[bool]) -> Self {
         let (functionals, volumes) = handed(Kernel::Volumetric, segments, common, listed);
         let other =
@@ -108,7 +108,7 @@ impl<const D: usize> Dilatations<D> {
                     match of_other {
                         None => found.push(common.bulk / size, &first, false),
                         Some((c, other, volumes)) => {
-                            // points on a face hand the two different volumes
+                            // points on a face contribute different volumes to the two
                             let (other, other_size) = whole(other, volumes);
                             found.push_two(
                                 [common.bulk + c, c],
@@ -160,7 +160,7 @@ impl<const D: usize> Dilatations<D> {
         self.add_row_of(site, |_| true, row);
     }
 
-    /// Adds to the row of a site what takes back the elements' own dilatations, and no more.
+    /// Adds to the row of a site only the terms that subtract the elements' own dilatations.
     pub fn take_back(&self, site: usize, row: &mut Row<D>) {
         self.add_row_of(site, |f| self.taken_back[f], row);
     }

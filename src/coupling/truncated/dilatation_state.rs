@@ -1,7 +1,7 @@
-//! Dilatations at a seam whose bonds turn, stretch and break.
+//! Dilatations at a seam whose bonds rotate, stretch and break.
 //!
-//! A part of the length s hands its elongation over, which to first order is `ξ·D` and in full `q = s |ξ|² ε`, ε its stretch: under any homogeneous deformation s times that of its whole bond. A dilatation is then
-//! `F = Σ b·u + Σ c q` with the energy `½ κ F²`; its first sum is an element's own `∫ div u`, which stays linear but for elements that follow the bonds (`element_dilatation.rs`).
+//! A part of the length s contributes its elongation, `ξ·Δu` to first order and `q = s |ξ|² ε` with its stretch ε in full. Under any homogeneous deformation q is s times that of the whole bond. A dilatation is
+//! `F = Σ b·u + Σ c q` with the energy `½ κ F²`. The first sum is an element's own `∫ div u`, linear except in elements that follow the bonds (`element_dilatation.rs`).
 
 use std::{borrow::Cow, collections::BTreeMap, sync::Arc};
 
@@ -26,7 +26,7 @@ pub(super) struct States<const D: usize> {
     /// Elements' own parts: site and b, by dilatation.
     own: Vec<(u32, Vector<D>)>,
     own_of: Vec<usize>,
-    /// Parts that hand over, and what, by dilatation.
+    /// Contributing parts with their factors, by dilatation.
     shares: Vec<(u32, f64)>,
     shares_of: Vec<usize>,
     /// The places in `shares` of each part, as dilatation and factor.
@@ -157,12 +157,12 @@ impl<const D: usize> States<D> {
         &self.own[self.own_of[f]..self.own_of[f + 1]]
     }
 
-    /// The parts that hand to a dilatation, and how much.
+    /// The parts that contribute to a dilatation, with their factors.
     pub fn shares_of(&self, f: usize) -> &[(u32, f64)] {
         &self.shares[self.shares_of[f]..self.shares_of[f + 1]]
     }
 
-    /// The dilatations to which a part hands its elongation, and how much of it.
+    /// The dilatations to which a part contributes its elongation, with their factors.
     pub fn of_part(&self, part: usize) -> &[(u32, f64)] {
         &self.of_part[self.parts_of[part]..self.parts_of[part + 1]]
     }
@@ -213,7 +213,7 @@ impl<const D: usize> States<D> {
         }
     }
 
-    /// `κ F` of the `wanted` dilatations, from the elements' own parts and what each of the others hands over.
+    /// `κ F` of the `wanted` dilatations, from the elements' own parts and the contributions of all others.
     pub fn pressures(
         &self,
         own: &OwnParts<'_, D>,

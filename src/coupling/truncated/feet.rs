@@ -1,8 +1,8 @@
 //! Changes of the traces at which pieces end.
 //!
-//! A piece that ends at `x` on a face follows `Σ w_a u(x_a)` over sites `a`: any weights with `Σ w_a = 1` and `Σ w_a x_a = x` keep forces and moments in balance and every energy positive. So beside the shape functions of the
-//! face there is a space of weights over the nodes around, and a node that few pieces reach, of an element smaller than the spacing or at a sharp corner of the zone, gets its load by them. Points at the seam count as well as nodes: where elements are large
-//! few nodes are near, and what positive factors cannot balance is at the points.
+//! A piece that ends at `x` on a face follows `Σ w_a u(x_a)` over sites `a`: any weights with `Σ w_a = 1` and `Σ w_a x_a = x` keep forces and moments in balance and every energy positive. Weights over nodes around the face may therefore be added to its
+//! shape functions. They load nodes that few pieces reach, those of an element smaller than the spacing or at a sharp corner of the zone. Points at the seam are included as well as nodes: where elements are large,
+//! few nodes are near, and the forces that positive factors cannot balance are at the points.
 
 use rustc_hash::FxHashMap;
 

@@ -13,9 +13,9 @@ use crate::{
 pub(super) struct LpsConstants {
     /// Normalisation of the dilatations of each lattice.
     pub over_m: Vec<Normal>,
-    /// K′ of the material, the same for all lattices.
+    /// `K′ = λ − μ` of the material, not its bulk modulus \[Pa\]; the same for all lattices.
     pub bulk: f64,
-    /// c of a position-aware solid; none of an LPS.
+    /// c of a position-aware solid, see `dilatation.rs`; none of an LPS.
     pub deviatoric: Option<f64>,
 }
 
@@ -65,7 +65,7 @@ impl LpsConstants {
         self.deviatoric.is_some()
     }
 
-    /// Visits the dilatations at the ends of a piece, each with the factor of the piece's elongation `ξ·D` that it gets.
+    /// Visits the dilatations at the ends of a piece, each with its factor of the piece's elongation `ξ·Δu`.
     pub fn shares<const D: usize>(
         &self,
         segments: &Segments<'_, D>,
@@ -141,7 +141,7 @@ pub(super) fn deviatoric_of<const D: usize>(state: &StatePart<D>) -> Option<f64>
     (state.deviator != 0.0).then(|| state.second.trace() / (D * D) as f64)
 }
 
-/// κ of the dilatation of a point, of the sum that its bonds hand over.
+/// Stiffness of the dilatation of a point, as the factor of `½ (Σ ω ξ·η V)²`.
 pub(super) fn stiffness_of_point<const D: usize>(segments: &Segments<'_, D>, i: u32) -> f64 {
     let body = segments.body;
     let state = body.state(i as usize);
@@ -182,7 +182,7 @@ pub(super) fn is_volumetric<const D: usize>(state: &StatePart<D>) -> bool {
         })
 }
 
-/// Whose dilatation a piece changes.
+/// Owner of a dilatation: a point, or an element behind a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Carrier {
     Point(u32),

@@ -1,28 +1,28 @@
 //! Truncated bonds: a seam that is symmetric, patch-exact and in exact equilibrium.
 //!
-//! | file | what |
+//! | file | content |
 //! |---|---|
-//! | `seam.rs` | the faces of the peridynamic zone, and the pieces of a bond inside of it |
-//! | `bond_segments.rs` | pieces with their ends, and their springs |
-//! | `nonlinear_bonds.rs`, `bond_kinematics.rs` | pieces that turn, stretch and break |
-//! | `dilatation.rs` | contributions of pieces to the dilatations of an LPS |
-//! | `dilatation_state.rs` | those dilatations where pieces turn, stretch and break |
-//! | `element_dilatation.rs` | those of elements that follow the bonds |
+//! | `seam.rs`, `piece.rs` | the faces of the peridynamic zone, and the pieces of a bond inside of it |
+//! | `bond_segments.rs`, `springs.rs` | pieces with their ends and stiffness, and their rows |
+//! | `nonlinear_bonds.rs`, `bond_kinematics.rs` | pieces that rotate, stretch and break |
+//! | `dilatation.rs`, `lps_constants.rs` | contributions of pieces to the dilatations of an LPS |
+//! | `dilatation_state.rs` | the same where pieces rotate, stretch and break |
+//! | `element_dilatation.rs` | the same in elements with the Cauchy–Born law of the bonds |
 //! | `corner_correction.rs` | strings along the edges of a zone in 3D |
-//! | `factors.rs` | factors of the normal equations of the fit, and what they cost |
-//! | `feet.rs` | other traces at the ends of pieces, where factors alone do not do |
-//! | `squares.rs` | factors of pieces where faces cut the lattice anywhere, and an LPS as a sum of squares |
-//! | `conditions.rs`, `normal.rs` | the conditions of the fit, and their normal equations |
-//! | `affine_fit.rs`, `sparse_least_norm.rs` | the same for an LPS with few bonds, shares of dilatations apart; the smallest change |
+//! | `affine_fit.rs` | the fit where faces cut the lattice anywhere |
+//! | `squares.rs` | its factors of pieces, and an LPS as a sum of squares |
+//! | `feet.rs` | its other traces at the ends of pieces, where factors alone do not suffice |
+//! | `fit_parts.rs`, `conditions.rs`, `sparse_least_norm.rs` | its unknowns, its conditions, and the smallest change that meets them |
+//! | `normal.rs`, `factors.rs` | its normal equations, their factorisation and cost |
 //!
-//! The energy is that of the finite elements, of the bonds within the peridynamic zone, and of the pieces of all other bonds of the lattice, continued behind the faces, that lie within the zone:
+//! The lattice is continued behind the faces of the zone. The energy is that of the finite elements, of the bonds within the zone, and of each *piece* of any other bond that lies in the zone:
 //!
 //! ```text
-//! s · w(ξ, (u(q) − u(p)) / s)
+//! s w(ξ, Δu / s) ,     Δu = u(q) − u(p)
 //! ```
 //!
-//! for a piece from `p` to `q` of the length `s`, a fraction of its bond ξ; an end within the zone is a point, an end on a face follows the trace of the element behind it. Under `u = G x` every piece
-//! pulls like the whole bond, so the forces on points cancel as far from the seam, and the forces on a face add up to the traction of the lattice. Pieces of bonds with both ends in elements
+//! for a piece from `p` to `q`. Its length `s` is a fraction of that of its bond ξ, whose energy is `w(ξ, η)` \[J\]. An end within the zone is a point; an end on a face has the trace of the displacement of the element behind it. Under `u = G x` every piece
+//! pulls like the whole bond. The forces on points therefore cancel as they do far from the seam, and the forces on a face add up to the traction of the lattice. Pieces of bonds with both ends in elements
 //! (through a corner of the zone, or a zone thinner than a horizon) belong to the sum.
 
 mod affine_fit;
@@ -81,10 +81,10 @@ pub struct Truncated {
 /// Treatment in motion of bonds that the seam cuts, where bonds are exact or break.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CutBonds {
-    /// They turn, stretch and break like others.
+    /// They rotate, stretch and break like others.
     #[default]
     Breaking,
-    /// They are rows of a matrix, which is cheaper. Damage that comes within two horizons of the seam is reported.
+    /// They are rows of a matrix, which is cheaper. No bond breaks within a horizon of the seam (two in an LPS); damage that reaches this layer is reported.
     Linear,
 }
 
@@ -216,7 +216,7 @@ impl Truncated {
         }
     }
 
-    /// The bonds that the seam cuts: rows, or what turns, stretches and breaks.
+    /// The bonds that the seam cuts: linear rows, or bonds that rotate, stretch and break.
     fn of_seam<'a, const D: usize>(
         &self,
         model: &'a Model<D>,
@@ -279,9 +279,9 @@ fn body_bonds<'a, const D: usize>(
     }
 }
 
-/// Looks at what a seam needs whose faces cut the lattice anywhere, without building it; none if the model has no seam.
+/// Returns the conditions that a seam has to meet whose faces cut the lattice anywhere, without building it; none if the model has no seam.
 ///
-/// It takes all eigenvalues of a dense matrix of the conditions, some ten for each site at the seam.
+/// Computes all eigenvalues of a dense matrix of the conditions: 1, 4 or 10 for each site at the seam in 1D, 2D, 3D.
 pub fn seam_conditions<const D: usize>(model: &Model<D>) -> Option<SeamConditions> {
     let (body, passing) = (model.body()?, model.passing()?);
     let mut segments = Segments::new(model, body, passing);
@@ -290,16 +290,16 @@ pub fn seam_conditions<const D: usize>(model: &Model<D>) -> Option<SeamCondition
 
 /// Decomposition of the bonds of the points at the seam.
 struct Pieces<const D: usize> {
-    /// Those of a pairwise law that are whole, and the body's; the others are springs. With dilatations all are springs.
+    /// The whole bonds that stay with the body, of a pairwise law; none with dilatations, where all bonds are springs.
     whole: Option<WholeBonds>,
-    /// Bonds between points of the zone that are not whole, lower number first.
+    /// Bonds between points of the zone that leave it in between, lower number first.
     broken: FxHashSet<(u32, u32)>,
     springs: Springs<D>,
     dilatations: Dilatations<D>,
     strings: EdgeCorrection<D>,
-    /// Points whose rows are not those of the body alone.
+    /// For each point, true if its row is not that of the body alone.
     listed: Vec<bool>,
-    /// True if no dilatation has a negative stiffness.
+    /// True if the energy of springs and dilatations is a sum of squares; of a law with two dilatations, that of the springs.
     squares: bool,
     /// True if dilatations by two influence functions are subtracted from one another.
     has_two_dilatations: bool,

@@ -1,9 +1,9 @@
-//! Bonds at a seam that turn, stretch and break: pieces one by one; whole bonds of a pairwise law are left to the pass over the body.
+//! Bonds at a seam that rotate, stretch and break: pieces one by one; whole bonds of a pairwise law are left to the pass over the body.
 //!
-//! A piece of the length s, a fraction of its bond ξ, has the energy `s w(ξ, D/s)`: it is stretched by `|ξ + D/s|/|ξ| − 1`, like the whole bond would be. The pieces of a bond break together, and take `s w` each, when the whole bond
+//! A piece of the length s, a fraction of its bond ξ, has the energy `s w(ξ, Δu/s)`: it is stretched by `|ξ + Δu/s|/|ξ| − 1`, as the whole bond would be. The pieces of a bond break together, and take `s w` each, when the whole bond
 //! passes the critical stretch, or soften together from its onset on (`softening.rs`): its ends move with their points, or with the elements that they lie in (`breaking.rs`). The elements behind the face keep their classical energy: a crack cannot go on into them.
 //!
-//! Of an LPS a piece also hands its elongation to dilatations (`dilatation_state.rs`). The energies of the points at the seam, halves of whole bonds and dilatations, are then here too, and the body's pass computes the others;
+//! In an LPS a piece also contributes its elongation to dilatations (`dilatation_state.rs`). The energies of the points at the seam, halves of whole bonds and dilatations, are then here too, and the body's pass computes the others;
 //! whole bonds break and soften there, and are reported here.
 
 mod breaking;
@@ -47,7 +47,7 @@ const CHUNK: usize = 1024;
 pub struct NonlinearSeam<const D: usize> {
     /// The families of the body without bonds that are not whole, or that a fit has changed.
     families: Families,
-    /// Points whose energy is here and not in the body's pass; empty for a pairwise law.
+    /// True for points whose energy is computed here and not in the body's pass; empty for a pairwise law.
     without_energy: Vec<bool>,
     states: Option<States<D>>,
     parts: Vec<Part<D>>,
@@ -56,11 +56,11 @@ pub struct NonlinearSeam<const D: usize> {
     /// The points of each bond, ends or not, and the first of its parts.
     bonds: Vec<[u32; 2]>,
     first: Vec<u32>,
-    /// The first bonds break here, the others in the body's pass.
+    /// Number of bonds, the first ones, that break here; the others break in the body's pass.
     own: usize,
-    /// Bits of the bonds that have all of their stiffness.
+    /// One bit per bond: set while it has all of its stiffness.
     intact: Vec<u8>,
-    /// Bonds that the last pass took stiffness from, and the part of it.
+    /// Bonds that lost stiffness in the last pass, with the lost fraction.
     last: Vec<(u32, f64)>,
     breaks: Option<Breaking<D>>,
     /// Of bonds that soften; none of bonds that break at once.
@@ -90,7 +90,7 @@ impl<const D: usize> NonlinearSeam<D> {
         self.kinematics = kinematics;
     }
 
-    /// Lets bonds break: by the numbers of its points at which stretch, from which onset on they soften if they do, and of a point whether its bonds never do.
+    /// Lets bonds break: `critical` gives the critical stretch of the bond between two points, `softening` the law by which bonds soften, if they do; `never` is true for points whose bonds never break.
     pub(in crate::coupling) fn let_break(
         &mut self,
         model: &Model<D>,
@@ -129,7 +129,7 @@ impl<const D: usize> NonlinearSeam<D> {
         &self.without_energy
     }
 
-    /// Directions in `pulls`, and elongations; zero for parts that do not stand.
+    /// Sets `pulls` to the directions of the parts, and their elongations; zero for parts of broken bonds.
     fn stretch<const EXACT: bool>(
         &self,
         u: &[f64],
@@ -152,7 +152,7 @@ impl<const D: usize> NonlinearSeam<D> {
         });
     }
 
-    /// Makes pulls of directions; returns what the dilatations press with.
+    /// Turns directions into forces, in `pulls`; returns the pressures `κ F` of the dilatations.
     fn pull(
         &self,
         own: Option<&OwnParts<'_, D>>,
@@ -179,7 +179,7 @@ impl<const D: usize> NonlinearSeam<D> {
         pressures
     }
 
-    /// Adds the forces of pulls, and of the dilatations, to which elements have given their `own` parts.
+    /// Adds the forces in `pulls`, and those of the elements' `own` parts of the dilatations.
     fn add_forces(
         &self,
         pulls: &[[f64; D]],
@@ -271,7 +271,7 @@ impl<const D: usize> NonlinearSeam<D> {
         })
     }
 
-    /// Adds per unknown a bound of the sum of the sizes of its row.
+    /// Adds for every unknown an upper bound of `Σ_b |K_ab|` \[N/m\].
     pub(in crate::coupling) fn add_row_sums(&self, sums: &mut [f64]) {
         for (s, &site) in self.sites.iter().enumerate() {
             for &(p, w) in &self.ends[self.offsets[s]..self.offsets[s + 1]] {

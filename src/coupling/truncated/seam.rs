@@ -73,12 +73,14 @@ pub(super) struct Seam<'a, const D: usize> {
     bins: FxHashMap<[i64; D], Vec<u32>>,
     /// Bins from which a bond reaches a face.
     around: FxHashSet<[i64; D]>,
+    /// Edge of a bin \[m\], about the length of a bond.
     size: f64,
+    /// Length of the longest bond \[m\].
     longest: f64,
     zone: Locator<D>,
 }
 
-/// End of a bond on faces: the nodes with their weights, and the elements behind.
+/// End of a piece on faces: the nodes with their weights, and the elements behind.
 #[derive(Clone, Debug)]
 pub(super) struct Foot {
     /// Sites and weights of the trace of the displacement.
@@ -187,7 +189,7 @@ impl<'a, const D: usize> Seam<'a, D> {
 
     /// Returns the course of the bond from `a` to `b`, as far as its ends and the faces determine it; `is_site` is true for an end that is a point of the zone.
     ///
-    /// Between two cuts a bond is inside or outside of the zone as a whole, and at an end that lies on no face it is what this end is.
+    /// Between two cuts a bond lies inside or outside of the zone as a whole; next to an end off the faces it lies on the side of that end.
     pub fn course(
         &self,
         a: &Vector<D>,
@@ -265,8 +267,8 @@ impl<'a, const D: usize> Seam<'a, D> {
 
     /// The pieces of the bond from `a` to `b` that lie in the zone, in order.
     ///
-    /// A bond that runs within a face or an edge, or through an edge or a corner, is the mean of the bonds beside it: only so
-    /// does the sum of a shape function over the ends on a face equal its integral. `near` lists the faces around, as [`Seam::faces_around`] gives them.
+    /// A bond within a face or an edge, or through an edge or a corner, counts as the mean of the bonds beside it. Otherwise the sum of a shape function
+    /// over the ends on a face would not equal its integral. `near` lists the faces around, as [`Seam::faces_around`] gives them.
     pub fn pieces(&self, a: &Vector<D>, b: &Vector<D>, near: &[u32], pieces: &mut Vec<Piece>) {
         pieces.clear();
         let mut cuts = vec![0.0, 1.0];
@@ -320,12 +322,12 @@ impl<'a, const D: usize> Seam<'a, D> {
         pieces.sort_unstable_by(|p, q| p.from.total_cmp(&q.from).then(p.to.total_cmp(&q.to)));
     }
 
-    /// Returns true if a bond of a point can meet a face at all.
+    /// Returns true if a bond of a point at `x` may meet a face.
     pub fn is_around(&self, x: &Vector<D>) -> bool {
         self.around.contains(&bin_of(x, self.size))
     }
 
-    /// Returns true if a bond can meet a face at all.
+    /// Returns true if the bond from `a` to `b` may meet a face.
     pub fn near(&self, a: &Vector<D>, b: &Vector<D>) -> bool {
         let mut found = false;
         for_box(
@@ -336,7 +338,7 @@ impl<'a, const D: usize> Seam<'a, D> {
         found
     }
 
-    /// The end of a bond at `x`, on the faces, of those that `near` lists; `None` if no face is there.
+    /// The end of a piece at `x` on the faces that `near` lists; `None` if no face is there.
     pub fn foot(&self, x: &Vector<D>, near: &[u32]) -> Option<Foot> {
         let mesh = &self.model.mesh;
         let distance = |face: &&Face<D>| mesh.distance_to_facet(x, &face.nodes);

@@ -15,11 +15,11 @@ use rustc_hash::FxHashMap;
 
 const NONE: u32 = u32::MAX;
 
-/// Which bonds of the body lie in the zone as a whole, and are as the body has them.
+/// Bonds that lie in the zone as a whole and have the stiffness of the body's.
 pub(super) struct WholeBonds {
     pub site: Vec<u32>,
     pub at_seam: Vec<bool>,
-    /// Bonds between points of the zone that are not whole, lower number first.
+    /// Bonds between points of the zone that leave it in between, lower number first.
     pub broken: FxHashSet<(u32, u32)>,
     pub changed: FxHashMap<(u32, u32), Changed>,
 }
@@ -46,7 +46,7 @@ impl WholeBonds {
     }
 }
 
-/// Springs along bonds: the energy `½ k (ξ·D)²` of each, with `D = Σ w u`.
+/// Springs along bonds: the energy `½ k (ξ·Δu)²` of each, with `Δu = Σ w u` over sites.
 pub(super) struct Springs<const D: usize> {
     pub direction: Vec<Vector<D>>,
     pub stiffness: Vec<f64>,
@@ -70,9 +70,9 @@ pub(super) struct Origin {
 pub(super) struct OwnSpring<const D: usize> {
     /// ξ.
     pub direction: Vector<D>,
-    /// k of `½ k (ξ·D)²`.
+    /// k of `½ k (ξ·Δu)²`.
     pub stiffness: f64,
-    /// Sites and weights of `D`.
+    /// Sites and weights of `Δu`.
     pub difference: Vec<(u32, f64)>,
     pub origin: Origin,
 }
@@ -89,7 +89,7 @@ impl<const D: usize> Springs<D> {
 
     /// All pieces, the whole bonds that a fit has changed, and the other whole bonds of the points that `listed` names.
     ///
-    /// A piece of the length s, as a fraction of its bond, has the energy `s w(D/s)`, so the stiffness `k/s`.
+    /// A piece of the length s, as a fraction of its bond, has the energy `s w(Δu/s)` and hence the stiffness `k/s`.
     pub fn new(segments: &Segments<'_, D>, listed: Option<&[bool]>) -> Self {
         let mut springs = Self {
             direction: Vec::new(),

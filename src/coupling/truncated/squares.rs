@@ -1,12 +1,12 @@
 //! Factors of pieces, and of whole bonds at the seam, that make affine fields exact on any faces: of a pairwise law, and of an LPS as a sum of squares.
 //!
-//! An LPS is `½ k θ² V + ½ α Σ ω e_d² V'`, with the extension `e_d = e − θ |ξ|/D`. With `A` the stiffness that a point gets of each of its bonds or pieces, of the energy `½ A e²` with `e = ξ·D/s`, this is
+//! The energy of an LPS is `½ κ θ² V + ½ α Σ ω e_d² V V'`, with the bulk modulus κ, `α = D (D + 2) μ/m` and the deviatoric extension `e_d = e − θ |ξ|/D`. Let `A` be the stiffness that a point gets of each of its bonds or pieces, with the energy `½ A g²`, where `g = ξ·Δu/s` is `|ξ|` times the extension. The energy is then
 //!
 //! ```text
-//! ½ k V_i θ_i² + ½ Σ A (e − |ξ|² θ_i/D)² ,    θ_i Σ A |ξ|⁴ = D Σ A |ξ|² e ,    V_i ∝ Σ A |ξ|⁴
+//! ½ κ V_i θ_i² + ½ Σ A (g − |ξ|² θ_i/D)² ,    θ_i Σ A |ξ|⁴ = D Σ A |ξ|² g ,    V_i ∝ Σ A |ξ|⁴
 //! ```
 //!
-//! for any `A ≥ 0`: never negative, whatever Poisson's ratio is. A bond between two points is split between them, a piece that ends on a face belongs to its point; elements keep their classical energy. Affine fields
+//! for any `A ≥ 0`, and never negative, whatever Poisson's ratio is. A bond between two points is split between them, a piece that ends on a face belongs to its point; elements keep their classical energy. Affine fields
 //! are exact if the third moments `Σ w A ξ⊗ξ⊗ξ` are in balance at every site, as for a pairwise law, and if `Σ A |ξ|² ξ⊗ξ` is isotropic at every point. The forces of the dilatations are then in
 //! balance by themselves: they are a trace of the third moments.
 
@@ -115,8 +115,12 @@ pub(super) fn fit_factors<const D: usize>(
     Ok(left)
 }
 
-/// The pairwise stiffness of the whole bond that the end of a part gets, or that of both.
-fn c1122<const D: usize>(segments: &Segments<'_, D>, part: &Part, end: Option<usize>) -> f64 {
+/// Stiffness k of the pairwise energy `½ k (ξ·η)²` of the whole bond of a part: the share of one end, or all of it.
+fn pair_stiffness<const D: usize>(
+    segments: &Segments<'_, D>,
+    part: &Part,
+    end: Option<usize>,
+) -> f64 {
     let (i, j) = part.points(segments);
     let volume = &segments.body.cloud.volume;
     match end {
@@ -135,7 +139,10 @@ fn columns<const D: usize>(
 ) -> Vec<Column> {
     let short = SHORT * segments.model.spacing();
     let mut columns = Vec::with_capacity(2 * parts.len());
-    let all: Vec<f64> = parts.iter().map(|p| c1122(segments, p, None)).collect();
+    let all: Vec<f64> = parts
+        .iter()
+        .map(|p| pair_stiffness(segments, p, None))
+        .collect();
     let least = NOTHING * all.iter().copied().fold(0.0, f64::max);
     for (part, of) in parts.iter().enumerate() {
         let shape = of.shape(segments);
@@ -161,7 +168,7 @@ fn columns<const D: usize>(
             let own = match points {
                 [Some(_), Some(_)] => 1.0,
                 // the only point has all of it
-                _ => all / c1122(segments, of, Some(end.0)),
+                _ => all / pair_stiffness(segments, of, Some(end.0)),
             };
             columns.push(Column {
                 part,
@@ -210,11 +217,11 @@ fn system<const D: usize>(
         let part = &parts[column.part];
         let shape = part.shape(segments);
         let end = column.end.map(|e| e.0);
-        let own = c1122(segments, part, end) * shape.share;
+        let own = pair_stiffness(segments, part, end) * shape.share;
         // points keep what their whole bonds had
         let is_first = number == 0 || columns[number - 1].part != column.part;
         let all = match is_first {
-            true => c1122(segments, part, None) * shape.share,
+            true => pair_stiffness(segments, part, None) * shape.share,
             false => 0.0,
         };
         let cube = cube(&shape.xi, 1.0);
@@ -263,7 +270,7 @@ fn add_shifts<const D: usize>(
         let part = Part::Piece(shift.piece);
         let shape = part.shape(segments);
         let sign = [-SHIFTED, SHIFTED][shift.side];
-        let size = sign * c1122(segments, &part, None) * shape.share;
+        let size = sign * pair_stiffness(segments, &part, None) * shape.share;
         let cube = cube(&shape.xi, size);
         for &(site, w) in &shift.weights {
             let Some(&row) = rows.get(&site) else {
@@ -294,11 +301,11 @@ fn adopt<const D: usize>(
         let part = &parts[of[0].0.part];
         let (i, j) = part.points(segments);
         let shape = part.shape(segments);
-        let all = c1122(segments, part, None);
+        let all = pair_stiffness(segments, part, None);
         let (mut scale, mut hands) = (0.0, [0.0; 2]);
         for (column, x) in of {
             let factor = column.base * (1.0 + **x);
-            let own = c1122(segments, part, column.end.map(|e| e.0));
+            let own = pair_stiffness(segments, part, column.end.map(|e| e.0));
             scale += factor * own / all;
             let Some((side, point)) = column.end else {
                 continue;

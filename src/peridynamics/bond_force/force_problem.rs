@@ -43,7 +43,7 @@ pub enum BondForce<'a, const D: usize> {
     /// Prototype microelastic brittle (PMB), [SAND2015-7998] eq. (3.1) linearised: both ends together pull with `2 p ξ (ξ·η) V_i V_j`; exact bonds with `2 p r² (1 − r/|ξ+η|) (ξ+η) V_i V_j`,
     /// whose energy `p r² (|ξ+η| − r)² V_i V_j` is quadratic in the extension.
     Pairwise {
-        /// `p`, the pairwise coefficient of [`crate::peridynamics::linear_force_state`] \[N/m^(2D+2)\].
+        /// `p`, the pairwise coefficient of [`crate::peridynamics::linear_force_state`] \[N/m^(2D+3)\].
         coefficient: &'a BondFunction<'a, D>,
     },
     /// Linear peridynamic solid, [SAND2015-7998] eq. (5.16), (5.17), (5.18), `T = [(D k − (D+2) μ)/m θ ω r + D(D+2) μ/m ω e] M`; the weighted volume `m` is that of the reference family and stays.

@@ -28,7 +28,7 @@
 //! | `simd.rs` | eight numbers at a time, by the machine's widest instructions |
 //! | `reference_force.rs`, `tests.rs`, `softening_tests.rs` | passes against a plain double loop |
 //!
-//! A bond is seen through `t = (2 ξ·η + η·η)/r²`, so that `|ξ + η| = r √(1 + t)`: no length is ever the difference of two long ones, and the stretch
+//! The deformation of a bond is expressed by `t = (2 ξ·η + η·η)/r²`, so that `|ξ + η| = r √(1 + t)`: no length is ever the difference of two long ones, and the stretch
 //! `s = √(1 + t) − 1` exceeds `s_c` exactly where `t > s_c (2 + s_c)`, without a root. Both ends of a bond compute the same `t` from the same numbers,
 //! hence break together without communication. Every method gives the same bits for any number of threads.
 

@@ -14,7 +14,7 @@ use crate::{
     tensor::{Tensor, Tensor4, Vector},
 };
 
-/// Linearised ordinary state-based linear peridynamic solid.
+/// Linear peridynamic solid, an ordinary state-based law.
 ///
 /// Source: [SAND2015-7998] eq. (5.16), with the dilatation θ of (5.17) and the weighted volume m of (5.18), for `D` dimensions with `k` the bulk modulus of `D` dimensions (`λ + 2μ/D`):
 ///
@@ -22,7 +22,13 @@ use crate::{
 /// T⟨ξ⟩ = (D k − (D+2) μ)/m  ω θ ξ  +  D(D+2) μ/m  ω  ξ (ξ·η)/|ξ|² ,     θ = D/m Σ ω ξ·η V ,   m = Σ ω |ξ|² V
 /// ```
 ///
-/// Differs from it by: nothing in 3D (3K − 5G, 15G, 3/m).
+/// In 3D the factors are those of the report: `3k − 5μ`, `15 μ` and `3/m`. The stored energy density is
+///
+/// ```text
+/// W = ½ K′ θ² + ½ α Σ ω e² V ,     α = D(D+2) μ/m ,   K′ = k − (D+2) μ/D = λ − μ ,   e = ξ·η/|ξ|
+/// ```
+///
+/// With geometrically exact bonds `e = |ξ + η| − |ξ|`, and T points along the deformed bond. A broken bond leaves the sums over `e` and for θ; m stays that of the whole family.
 #[derive(Clone, Debug)]
 pub struct LinearPeridynamicSolid<const D: usize> {
     /// The influence function ω.
@@ -193,7 +199,7 @@ impl<const D: usize> ForceState<D> for LinearPeridynamicSolid<D> {
         _present: Present<'_>,
         force: &mut [Vector<D>],
     ) -> EnergyDensity {
-        // θ m/D over intact bonds, and the modulus (D k − (D+2) μ)/m · D/m that multiplies it
+        // `theta` is θ m/D over intact bonds, `modulus` its factor (D k − (D+2) μ)/m · D/m
         let (mut theta, mut stored) = (0.0, 0.0);
         for (k, e) in family.extension.iter().enumerate() {
             theta += family.omega[k] * family.bonds[k].norm() * e * family.volumes[k];
@@ -201,9 +207,9 @@ impl<const D: usize> ForceState<D> for LinearPeridynamicSolid<D> {
         let modulus = family.state.map_or(0.0, |s| s.modulus.get(0, 0, 0, 0));
         for (k, force) in force.iter_mut().enumerate() {
             let (e, r) = (family.extension[k], family.bonds[k].norm());
-            let deviatoric = family.pair[k] * r * r * e;
-            *force = family.direction[k] * (deviatoric + modulus * theta * family.omega[k] * r);
-            stored += 0.5 * deviatoric * e * family.volumes[k];
+            let pairwise = family.pair[k] * r * r * e;
+            *force = family.direction[k] * (pairwise + modulus * theta * family.omega[k] * r);
+            stored += 0.5 * pairwise * e * family.volumes[k];
         }
         EnergyDensity {
             stored: stored + 0.5 * modulus * theta * theta,

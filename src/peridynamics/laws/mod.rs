@@ -1,4 +1,4 @@
-//! Peridynamic laws, one file each; [`crate::peridynamics::law`] says what a law is.
+//! Peridynamic laws, one file each; [`crate::peridynamics::law`] defines their interface.
 //!
 //! | file | law | source |
 //! |---|---|---|
@@ -12,11 +12,11 @@
 //! | `maxwell.rs` | viscoelastic bonds, one Maxwell arm | section 4.3 |
 //! | `local_correspondence.rs` | correspondence with any local law | section 7.2 |
 //! | `several.rs` | several materials of one law in one body | |
-//! | `plastic.rs`, `johnson_cook.rs` | its stress that of J2 plasticity | |
-//! | `viscoelastic.rs` | its stress that of linear viscoelasticity | section 4.3 |
-//! | `relaxing.rs` | keys of a shear modulus that relaxes | |
-//! | `damage.rs` | its stress that of scalar damage | section 6.2.6 |
-//! | `neo_hooke.rs`, `st_venant_kirchhoff.rs` | its stress hyperelastic, for large deformations | |
+//! | `plastic.rs`, `johnson_cook.rs` | correspondence with J2 plasticity | |
+//! | `viscoelastic.rs` | correspondence with linear viscoelasticity | section 4.3 |
+//! | `relaxing.rs` | parameters of a shear modulus that relaxes | |
+//! | `damage.rs` | correspondence with scalar damage | section 6.2.6 |
+//! | `neo_hooke.rs`, `st_venant_kirchhoff.rs` | correspondence with hyperelasticity, for large deformations | |
 //!
 //! A law that implements [`NamedLaw`] and has its line in the list at the end of this file is a material of scenes, by its key.
 
@@ -104,7 +104,7 @@ impl Parameter {
     }
 }
 
-/// Softening of bonds that break by a fracture energy. By default a crack grows at the load that the energy stands for; bonds that break at once are trapped by the lattice, and want up to 1.4 times it (`bondline verify growth`).
+/// Softening of bonds that break by a fracture energy. With the default a crack grows at the load of linear elastic fracture mechanics; with bonds that break at once the lattice traps it up to 1.4 times that load (`bondline verify growth`).
 pub const SOFTENING: Parameter = Parameter {
     key: "softening",
     about: "Stretch at which a bond is through over that at which it begins to soften, with `fracture-energy`; 1 for bonds that break at once. 3 if left out, or 1 where bonds cannot soften.",
@@ -118,7 +118,7 @@ pub const SOFTENING: Parameter = Parameter {
 /// Poisson ratios that a law has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ratio {
-    /// That of bonds that act alone.
+    /// That of pairwise bonds: 1/4, in plane stress 1/3.
     Pairwise,
     /// Any: a scene gives it.
     Any,

@@ -71,7 +71,7 @@ impl Explicit<'_> {
         }
     }
 
-    /// Collective: the sums of a step over all processes. Those of energies differ from those of one process in their last digits, and tell of trouble only.
+    /// Collective: the sums of a step over all processes. Energies differ from those of one process in their last digits; they serve only to detect an unstable motion.
     pub(super) fn add_over_processes(&mut self, sums: [&mut Sums; 2], outcome: &mut Outcome) {
         let Some(system) = self.system.shared_steps() else {
             return;

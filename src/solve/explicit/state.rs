@@ -4,7 +4,7 @@ use crate::system::{Halfway, SemiDiscrete};
 
 /// Drive of a motion: external forces and prescribed displacements, as functions of time.
 ///
-/// Nothing here may depend on what was called before, or a resumed run would differ from one that never stopped.
+/// No answer may depend on earlier calls, or a resumed run would differ from one without interruption.
 pub trait Drive: Sync {
     /// Overwrites `load` with the external force on every dof \[N\] at `time` \[s\].
     fn load_into(&self, time: f64, load: &mut [f64]);
@@ -46,9 +46,9 @@ impl Drive for Undriven {
     fn velocity_into(&self, _time: f64, _values: &mut [f64]) {}
 }
 
-/// All that changes in a motion, but for the damage, which the system keeps ([`BodyHistory::damage_state`](crate::system::BodyHistory::damage_state)): both together resume a run bit for bit.
+/// State of a motion without the damage, which the system keeps ([`BodyHistory::damage_state`](crate::system::BodyHistory::damage_state)): both together resume a run bit for bit.
 ///
-/// Shapes: one entry per dof. Units: \[s\], \[m\], \[m/s\], \[m/s²\], \[J\].
+/// Shapes: one entry per dof. Units: time \[s\], u \[m\], v \[m/s\], a \[m/s²\], energies \[J\].
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     /// Time.
@@ -59,16 +59,16 @@ pub struct State {
     pub u: Vec<f64>,
     /// Velocity.
     pub v: Vec<f64>,
-    /// Acceleration; empty before the driver has seen the state for the first time.
+    /// Acceleration; empty before the first call of [`Explicit::new`](super::Explicit::new).
     pub a: Vec<f64>,
     /// Work done by loads and supports since the start.
     pub work: f64,
-    /// Energy at the start plus the work in absolute values: what the motion can have, to tell a runaway by.
+    /// Energy at the start plus the work in absolute values: an upper bound of the energy of the motion, for the check against runaway.
     pub supplied: f64,
     /// Bonds broken since the start.
     pub broken: u64,
-    /// Force \[N\] that moved each prescribed dof at the last step, in the order of [`Drive::prescribed`]; empty before the first. To respond to the state once more gives another by rounding, or
-    /// without a drag, and half of a step's work is that of this one.
+    /// External force \[N\] on each prescribed dof at the last step, in the order of [`Drive::prescribed`]; empty before the first. A resumed run takes it for half of the work of its next step:
+    /// a new evaluation would differ by rounding, or by a drag.
     pub held: Vec<f64>,
 }
 
@@ -82,7 +82,7 @@ impl State {
         }
     }
 
-    /// The displacement at which bonds are accounted for that the last force broke, within steps of a given size; velocities are those of the half step.
+    /// The displacement half a step back, at which bonds that the last force broke are accounted for; velocities are those of the half step.
     pub(super) fn halfway(&self, step: f64) -> Halfway<'_> {
         Halfway {
             u: &self.u,
@@ -109,7 +109,7 @@ pub struct ExplicitParams {
 impl ExplicitParams {
     /// Steps of a given size.
     pub fn with_step(step: f64) -> ExplicitParams {
-        // couplings that are not symmetric exchange some per cent of energy with a pulse at the seam; an instability passes any factor within a few hundred steps
+        // unsymmetric couplings change the energy of a pulse at the seam by some per cent; an instability exceeds any factor within a few hundred steps
         ExplicitParams {
             step,
             runaway: 100.0,
@@ -117,14 +117,14 @@ impl ExplicitParams {
     }
 }
 
-/// Energies after a step `n → n+1` \[J\]; at the start those of the start, with no half step between.
+/// Energies after a step `n → n+1` \[J\]; at the start all are those of the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Energies {
     /// `½ vᵀ M v` at `n+1`.
     pub kinetic: f64,
     /// `½ vᵀ M v` at `n+½`.
     pub kinetic_half: f64,
-    /// `½ v_{n+½}ᵀ M v_{n+½} + ½ u_nᵀ F(u_{n+1})`: of a linear symmetric system it differs from its start by `work_half` only.
+    /// `½ v_{n+½}ᵀ M v_{n+½} + ½ u_nᵀ F(u_{n+1})`: in a linear symmetric system its change since the start is `work_half`.
     pub discrete: f64,
     /// Work of loads and supports up to `n+1`.
     pub work: f64,

@@ -6,7 +6,7 @@ use crate::system::ExactSum;
 /// Partial sums of one chunk.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sums {
-    /// `Σ m v²`.
+    /// `Σ m v²` after the step.
     pub kinetic: f64,
     /// `Σ m v²` before the last half kick.
     pub kinetic_half: f64,

@@ -1,4 +1,4 @@
-//! Which bonds of a seam break: those whose two ends have moved too far apart, whatever their pieces do.
+//! Breaking of the bonds of a seam, by the stretch of whole bonds, not of their pieces.
 //!
 //! A piece may be shorter than the spacing, and the trace at its end may follow nodes and points around: its own stretch is not that of its bond. An end in the zone moves with its point, one in an element with the shape functions
 //! there. Of a bond that leaves the mesh, the part within it counts.

@@ -1,4 +1,4 @@
-//! Which bonds and dilatations of a seam a process computes, and whose costs it counts.
+//! Bonds and dilatations of a seam that a process computes, and whose costs it counts.
 
 /// Bonds and dilatations of a seam that a process computes.
 #[derive(Debug, Default)]
