@@ -5,7 +5,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use bondline::mesh::{self, CellShape};
+use bondline::mesh::CellShape;
+use bondline::mesh::read::read;
 use bondline::observe::vtu::{Compression, Field, Snapshot, write_vtu};
 use bondline::tensor::Vector;
 use vtkio::model::{
@@ -24,7 +25,13 @@ const DAMAGED: usize = 300;
 fn cube() -> Snapshot {
     let node = |i: u32, j: u32, k: u32| (k * EDGE + j) * EDGE + i;
     let mut s = Snapshot::default();
-    let place = |n: u32| Vector::<3>::new((n % EDGE).into(), (n / EDGE % EDGE).into(), (n / EDGE / EDGE).into());
+    let place = |n: u32| {
+        Vector::<3>::new(
+            (n % EDGE).into(),
+            (n / EDGE % EDGE).into(),
+            (n / EDGE / EDGE).into(),
+        )
+    };
     let nodes: Vec<Vector<3>> = (0..EDGE.pow(3)).map(place).collect();
     s.points = nodes.iter().map(|x| [x[0], x[1], x[2]]).collect();
     for c in 0..(EDGE - 1).pow(3) {
@@ -34,7 +41,8 @@ fn cube() -> Snapshot {
         let corners = [0, 1].map(|up| base.map(|(a, b)| node(i + a, j + b, k + up)));
         s.push_cell(CellShape::Hex8, corners.as_flattened());
     }
-    let wave = |x: &Vector<3>, a: f64| (a * x[0] / 17.0).sin() * (x[1] / 23.0 + a).cos() + 1e-3 * x[2];
+    let wave =
+        |x: &Vector<3>, a: f64| (a * x[0] / 17.0).sin() * (x[1] / 23.0 + a).cos() + 1e-3 * x[2];
     let moved: Vec<Vector<3>> = nodes
         .iter()
         .map(|x| Vector::<3>::new(wave(x, 1.0), wave(x, 2.0), wave(x, 3.0)))
@@ -104,28 +112,59 @@ fn row(what: &str, seconds: f64, path: &Path) {
 
 fn size_and_time(folder: &Path) {
     let shown = cube();
-    println!("{} points, {} hexahedra, written:", shown.points.len(), shown.shapes.len());
+    println!(
+        "{} points, {} hexahedra, written:",
+        shown.points.len(),
+        shown.shapes.len()
+    );
     let path = |name: &str| folder.join(name);
     for (name, file, compression) in [
-        ("own, base64 by zlib, as runs write", "own.vtu", Compression::Zlib),
+        (
+            "own, base64 by zlib, as runs write",
+            "own.vtu",
+            Compression::Zlib,
+        ),
         ("own, base64", "own_plain.vtu", Compression::Plain),
     ] {
-        row(name, seconds(|| write_vtu(&path(file), &shown, compression).unwrap()), &path(file));
+        row(
+            name,
+            seconds(|| write_vtu(&path(file), &shown, compression).unwrap()),
+            &path(file),
+        );
     }
     // what it takes is made before the time begins
     let mut copies = vec![for_vtkio(&shown); 6];
     let mut next = || copies.pop().unwrap();
     let file = path("vtkio.vtu");
-    row("vtkio, base64", seconds(|| next().export(&file).unwrap()), &file);
+    row(
+        "vtkio, base64",
+        seconds(|| next().export(&file).unwrap()),
+        &file,
+    );
     let file = path("vtkio_zlib.vtu");
-    let zlib = |vtk: Vtk| vtk.try_into_xml_format(Compressor::ZLib, 1).unwrap().export(&file).unwrap();
+    let zlib = |vtk: Vtk| {
+        vtk.try_into_xml_format(Compressor::ZLib, 1)
+            .unwrap()
+            .export(&file)
+            .unwrap()
+    };
     row("vtkio, asked for zlib", seconds(|| zlib(next())), &file);
     let file = path("vtkio.vtk");
-    row("vtkio, legacy, binary", seconds(|| next().export(&file).unwrap()), &file);
+    row(
+        "vtkio, legacy, binary",
+        seconds(|| next().export(&file).unwrap()),
+        &file,
+    );
     println!("read:");
-    for file in ["own.vtu", "own_plain.vtu", "vtkio.vtu", "vtkio_zlib.vtu", "vtkio.vtk"] {
+    for file in [
+        "own.vtu",
+        "own_plain.vtu",
+        "vtkio.vtu",
+        "vtkio_zlib.vtu",
+        "vtkio.vtk",
+    ] {
         let at = path(file);
-        let own = seconds(|| drop(mesh::read::<3>(&at).map(|m| m.cell_count())));
+        let own = seconds(|| drop(read::<3>(&at).map(|m| m.cell_count())));
         row(&format!("{file}, mesh alone by the library"), own, &at);
         let other = seconds(|| drop(loaded(&at)));
         row(&format!("{file}, all fields by vtkio"), other, &at);
@@ -140,7 +179,9 @@ fn loaded(path: &Path) -> Result<usize, String> {
     };
     let mut cells = 0;
     for piece in pieces {
-        let piece = piece.into_loaded_piece_data(None).map_err(|e| e.to_string())?;
+        let piece = piece
+            .into_loaded_piece_data(None)
+            .map_err(|e| e.to_string())?;
         cells += piece.cells.types.len();
     }
     Ok(cells)
@@ -156,12 +197,16 @@ fn fixtures(folder: &Path) {
     std::panic::set_hook(Box::new(|_| ()));
     let mut random: u64 = 1;
     let mut draw = |below: usize| {
-        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        random = random
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (random >> 33) as usize % below
     };
-    println!("\nfile, cells by the library, by vtkio; of {DAMAGED} damaged copies: panics of the library, of vtkio");
+    println!(
+        "\nfile, cells by the library, by vtkio; of {DAMAGED} damaged copies: panics of the library, of vtkio"
+    );
     for file in &files {
-        let own = mesh::read::<2>(file).map_or_else(|_| "refused".into(), |m| m.cell_count().to_string());
+        let own = read::<2>(file).map_or_else(|_| "refused".into(), |m| m.cell_count().to_string());
         let other = catch_unwind(|| loaded(file)).map_or_else(
             |_| "panics".to_owned(),
             |found| found.map_or_else(|e| e, |n| format!("{n} elements")),
@@ -181,11 +226,14 @@ fn fixtures(folder: &Path) {
             let mut count = |k: usize, work: &dyn Fn()| {
                 panics[k] += usize::from(catch_unwind(AssertUnwindSafe(work)).is_err());
             };
-            count(0, &|| drop(mesh::read::<2>(&damaged)));
+            count(0, &|| drop(read::<2>(&damaged)));
             count(1, &|| drop(loaded(&damaged)));
         }
         let name = file.file_name().unwrap().to_string_lossy();
-        println!("{name:22} {own:>8} {other:>24}   {:4} {:4}", panics[0], panics[1]);
+        println!(
+            "{name:22} {own:>8} {other:>24}   {:4} {:4}",
+            panics[0], panics[1]
+        );
     }
 }
 

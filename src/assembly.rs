@@ -48,7 +48,9 @@ impl Transfer {
         });
         // sprs appends to a matrix that it takes and gives back
         let matrix = std::mem::replace(&mut self.0, CsMatI::empty(CompressedStorage::CSR, 0));
-        let row = row.into_iter().map(|(site, weight)| (site as usize, weight));
+        let row = row
+            .into_iter()
+            .map(|(site, weight)| (site as usize, weight));
         self.0 = matrix.append_outer_iter(row);
     }
 

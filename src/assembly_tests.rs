@@ -88,11 +88,14 @@ fn the_pattern_is_that_of_the_matrix() {
 
 #[test]
 fn a_place_is_the_sum_of_its_weights() {
-    let transfer = Transfer::from_rows(4, [
-        vec![(3, 0.25), (1, 0.5), (3, 0.25), (0, 0.0)],
-        vec![],
-        vec![(2, 1.0)],
-    ]);
+    let transfer = Transfer::from_rows(
+        4,
+        [
+            vec![(3, 0.25), (1, 0.5), (3, 0.25), (0, 0.0)],
+            vec![],
+            vec![(2, 1.0)],
+        ],
+    );
     assert_eq!(transfer.len(), 3);
     assert_eq!(transfer.row(0).collect::<Vec<_>>(), [(1, 0.5), (3, 0.5)]);
     assert_eq!(transfer.row(1).count(), 0);

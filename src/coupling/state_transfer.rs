@@ -188,10 +188,13 @@ impl<const D: usize> Carried<D> {
             self.fitted(&x, &at, &bins)
         })?;
         let mut fresh = fresh.into_iter();
-        let rows = Transfer::from_rows(self.position.len(), stayed.iter().map(|old| match old {
-            Some(site) => vec![(*site, 1.0)],
-            None => fresh.next().unwrap_or_default(),
-        }));
+        let rows = Transfer::from_rows(
+            self.position.len(),
+            stayed.iter().map(|old| match old {
+                Some(site) => vec![(*site, 1.0)],
+                None => fresh.next().unwrap_or_default(),
+            }),
+        );
         Ok(Carrying {
             rows,
             sites: stayed.len(),

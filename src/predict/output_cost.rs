@@ -9,7 +9,6 @@ use crate::observe::vtu::{Compression, Snapshot, write_vtu};
 use crate::run::solution::Solved;
 use crate::run::write::{Shown, snapshot, write};
 use crate::scene::Output;
-use crate::scene::spec::PointOutputSpec;
 
 /// Cells and points of the larger of two trial files, at least.
 const SHOWN: usize = 1500;

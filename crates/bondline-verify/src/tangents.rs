@@ -95,7 +95,10 @@ impl<const D: usize> RandomCloud<D> {
             position: self.position.clone(),
             volume: self.volume.clone(),
             horizon: bondline::peridynamics::Horizon::of_field(self.horizon.clone()),
-            transfer: Transfer::from_rows(self.position.len(), (0..self.position.len() as u32).map(|s| vec![(s, 1.0)])),
+            transfer: Transfer::from_rows(
+                self.position.len(),
+                (0..self.position.len() as u32).map(|s| vec![(s, 1.0)]),
+            ),
             material: Vec::new(),
         };
         PdBody::new(
