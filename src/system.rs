@@ -49,7 +49,7 @@ pub use ranks::{Exchange, RankRows, RankSolve, RankSolver, RankSolverKind, Ranks
 pub(crate) use ranks::{all_say, first_text};
 pub use segments::Segments;
 pub use shared_blocks::{GatheredRows, RowBatch, SharedRows};
-pub use shared_steps::{LostToBreaks, SharedSteps};
+pub use shared_steps::SharedSteps;
 pub use spmv::ROW_CHUNK;
 pub use springs::SpringRows;
 pub use tangent::Tangent;
@@ -109,8 +109,6 @@ impl Interval {
 pub struct Dissipation {
     /// Energy that was stored just before less that stored just after bonds broke, at the same displacement.
     pub energy: f64,
-    /// Area of the cracks that they left.
-    pub area: f64,
     /// Energy that bonds and points dissipated without breaking: flow, viscosity.
     pub inelastic: f64,
 }

@@ -311,7 +311,6 @@ impl<const D: usize> BodyHistory for CoupledSystem<'_, D> {
     fn account_for_breaks(&mut self, at: &Halfway<'_>) {
         let spent = self.of_last_breaks(at);
         self.spent.energy += spent.energy;
-        self.spent.area += spent.area;
     }
 
     fn damage_state(&self) -> Vec<u64> {
@@ -326,7 +325,7 @@ impl<const D: usize> BodyHistory for CoupledSystem<'_, D> {
             state.extend(elements.state());
         }
         if self.spends() > 0 {
-            let spent = [self.spent.energy, self.spent.area, self.spent.inelastic];
+            let spent = [self.spent.energy, self.spent.inelastic];
             state.extend(&spent.map(f64::to_bits)[..self.spends()]);
         }
         state
@@ -346,10 +345,9 @@ impl<const D: usize> BodyHistory for CoupledSystem<'_, D> {
         if let (true, Some(elements)) = (fits, &mut self.elements) {
             elements.restore(of_elements);
         }
-        if let (true, &[energy, area, ref rest @ ..]) = (fits, spent) {
+        if let (true, &[energy, ref rest @ ..]) = (fits, spent) {
             self.spent = Dissipation {
                 energy: f64::from_bits(energy),
-                area: f64::from_bits(area),
                 inelastic: rest.first().map_or(0.0, |bits| f64::from_bits(*bits)),
             };
         }

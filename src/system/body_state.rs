@@ -18,6 +18,9 @@ pub trait BodyState {
     /// Broken bonds by the sites of their ends, each once for each direction; without those that a seam cuts.
     fn broken_bonds(&self) -> Vec<(u32, u32)>;
 
+    /// Area of the cracks that broken bonds have left, those that a seam cuts among them \[m^(D−1)\]. Collective where families are spread.
+    fn crack_area(&self) -> f64;
+
     /// Number of points that have lost so many bonds that their law does not respond: they carry no stress of their own.
     fn points_without_response(&self, u: &[f64]) -> usize;
 

@@ -5,15 +5,6 @@
 
 use super::{ExactSum, FailureUpdate, Halfway, Traffic};
 
-/// Cost of the bonds that broke in one step, at own sites: sums that processes add.
-#[derive(Clone, Debug, Default)]
-pub struct LostToBreaks {
-    /// See [`super::Dissipation::energy`].
-    pub energy: ExactSum,
-    /// See [`super::Dissipation::area`].
-    pub area: ExactSum,
-}
-
 /// A system whose processes move their own sites and ghosts.
 ///
 /// Vectors have the numbers of all sites; those of sites that are neither own nor ghosts are anything.
@@ -30,11 +21,11 @@ pub trait SharedSteps {
     /// Collective: overwrites the forces of own sites and ghosts, and returns how many bonds of own sites broke.
     fn force_into(&mut self, u: &[f64], force: &mut [f64], update: FailureUpdate) -> u64;
 
-    /// Returns the cost of the bonds of own sites that broke in the last force.
-    fn lost(&self, at: &Halfway<'_>) -> LostToBreaks;
+    /// Returns the energy lost by the bonds of own sites that broke in the last force, see [`super::Dissipation::energy`]: a sum that processes add.
+    fn lost(&self, at: &Halfway<'_>) -> ExactSum;
 
     /// Adds the losses of all processes to the account of [`super::BodyHistory::dissipation`].
-    fn spend(&mut self, lost: &LostToBreaks);
+    fn spend(&mut self, lost: &ExactSum);
 
     /// Collective: overwrites each number with the sum of those of all processes.
     fn add_into(&self, sums: &mut [i64]);

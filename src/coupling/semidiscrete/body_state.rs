@@ -85,4 +85,8 @@ impl<const D: usize> BodyState for CoupledSystem<'_, D> {
     fn broken_bonds(&self) -> Vec<(u32, u32)> {
         self.broken_between_sites()
     }
+
+    fn crack_area(&self) -> f64 {
+        self.area_of_cracks()
+    }
 }

@@ -8,8 +8,7 @@ use super::reached_sites::Reached;
 use super::rows::SiteRows;
 use super::{CoupledSystem, behaviour::NONE, body::MovingBody, split::Split};
 use crate::system::{
-    BondChanges, FailureUpdate, Ghosts, Halfway, LostToBreaks, Segments, SharedSteps, Spread,
-    Traffic,
+    BondChanges, ExactSum, FailureUpdate, Ghosts, Halfway, Segments, SharedSteps, Spread, Traffic,
 };
 use crate::tensor::Vector;
 use crate::{parallel, peridynamics::bond_force::Reach};
@@ -252,13 +251,12 @@ impl<const D: usize> SharedSteps for CoupledSystem<'_, D> {
         broken
     }
 
-    fn lost(&self, at: &Halfway<'_>) -> LostToBreaks {
+    fn lost(&self, at: &Halfway<'_>) -> ExactSum {
         self.lost_here(at)
     }
 
-    fn spend(&mut self, lost: &LostToBreaks) {
-        self.spent.energy += lost.energy.value();
-        self.spent.area += lost.area.value();
+    fn spend(&mut self, lost: &ExactSum) {
+        self.spent.energy += lost.value();
     }
 
     fn add_into(&self, sums: &mut [i64]) {

@@ -382,7 +382,7 @@ impl SegmentRecord {
 /// # Errors
 /// [`RunError::Fracture`].
 fn motion_summary<const D: usize>(
-    observer: StepObserver<'_, '_, D>,
+    mut observer: StepObserver<'_, '_, D>,
     motion: &Explicit<'_>,
     ended: Ended,
     energy_gain: Option<EnergyGain>,
@@ -394,6 +394,7 @@ fn motion_summary<const D: usize>(
     let moment = Moment::of(motion, observer.segment.is_linear);
     let state = moment.state;
     let stored = moment.system.stored_energy(&state.u);
+    let area = (observer.recorder).crack_area(state.broken, moment.system);
     let plane = plane_energy(model, rest)?;
     let zone = observer.zone;
     let (switches, shares) = zone.map_or((Vec::new(), [0.0; 2]), |z| (z.switches, z.shares));
@@ -410,7 +411,7 @@ fn motion_summary<const D: usize>(
         external_work: state.work,
         missing_energy: at_start + state.work - moment.kinetic - stored,
         energy_gain,
-        cracks: cracks(moment.system, observer.segment.breaks, plane),
+        cracks: cracks(moment.system, observer.segment.breaks, area, plane),
         inelastic_energy: inelastic_energy(moment.system),
         impactors: (observer.recorder.impact.as_ref()).map_or(Vec::new(), |i| i.summary(state)),
         broken_bonds: state.broken,
@@ -429,10 +430,11 @@ fn motion_summary<const D: usize>(
     })
 }
 
-/// Returns the dissipation by breaking bonds so far; none where none can break.
+/// Returns the dissipation by breaking bonds so far, and the area of the cracks; none where no bond can break.
 pub(crate) fn cracks(
     system: &dyn SemiDiscrete,
     breaks: Breaks,
+    area: f64,
     plane: Option<PlaneEnergy>,
 ) -> Option<CrackSummary> {
     let spent = system.dissipation().filter(|_| breaks.may())?;
@@ -440,13 +442,13 @@ pub(crate) fn cracks(
         // what the law dissipated is told of on its own: most of it beside the cracks
         return Some(CrackSummary {
             energy_per_area: None,
-            ..CrackSummary::new(spent.energy, spent.area)
+            ..CrackSummary::new(spent.energy, area)
         });
     }
     Some(CrackSummary {
         plane_energy: plane.map(|p| p.of_plane),
         fracture_energy: plane.and_then(|p| p.typed),
-        ..CrackSummary::new(spent.energy, spent.area)
+        ..CrackSummary::new(spent.energy, area)
     })
 }
 

@@ -503,12 +503,13 @@ impl<const D: usize> LoadStepObserver<'_, D> {
     /// # Errors
     /// [`RunError`] for loads or a fracture energy that cannot be evaluated.
     fn summary(
-        self,
+        mut self,
         system: &dyn SemiDiscrete,
         first: u64,
         seconds: f64,
     ) -> Result<RunSummary, RunError> {
         let (model, state) = (self.model, &self.state);
+        let area = self.recorder.crack_area(state.broken, system);
         let stored = system.stored_energy(&state.u);
         let (_, applied) = loads::loads(model, &self.rest.conditions, state.time)?;
         let plane = plane_energy(model, self.rest)?;
@@ -527,7 +528,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             external_work: state.work,
             missing_energy: self.recorder.energy_at_start + state.work - stored,
             energy_gain: None,
-            cracks: cracks(system, self.breaks, plane),
+            cracks: cracks(system, self.breaks, area, plane),
             inelastic_energy: inelastic_energy(system),
             impactors: (self.recorder.impact.as_ref()).map_or(Vec::new(), |i| i.summary(state)),
             broken_bonds: state.broken,

@@ -131,6 +131,8 @@ pub struct Recorder<'a, const D: usize> {
     pub last: EnergyRow,
     /// Growth of cracks between rows.
     pub growth: CrackGrowth,
+    /// Number of broken bonds, and the area of the cracks that they have left.
+    cracks: (u64, f64),
     /// Seconds that writing took.
     pub seconds: f64,
 }
@@ -178,6 +180,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             energy_at_start: written.map_or(0.0, |w| w.energy_at_start),
             last: EnergyRow::default(),
             growth: written.map_or_else(CrackGrowth::default, |w| w.growth),
+            cracks: (0, 0.0),
             seconds: 0.0,
         })
     }
@@ -252,6 +255,15 @@ impl<'a, const D: usize> Recorder<'a, D> {
         }
     }
 
+    /// Collective: area of the cracks, found anew where the number of broken bonds has changed since it was asked for last.
+    pub fn crack_area(&mut self, broken: u64, system: &dyn SemiDiscrete) -> f64 {
+        if self.cracks.0 != broken {
+            let body = system.body_state();
+            self.cracks = (broken, body.map_or(0.0, |body| body.crack_area()));
+        }
+        self.cracks.1
+    }
+
     /// Appends to the history and to the tables of tips; `probed` are the stresses at the probes.
     ///
     /// # Errors
@@ -280,7 +292,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         }
         if self.breaks.may() {
             row.push((state.broken as i64).into());
-            let area = system.dissipation().map_or(0.0, |d| d.area);
+            let area = self.crack_area(state.broken, *system);
             self.growth.watch(state, area);
             row.push(area.into());
         }

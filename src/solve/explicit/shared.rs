@@ -2,7 +2,7 @@
 
 use super::sums::{Sums, total};
 use super::{Energies, Explicit, Reading, SITES};
-use crate::system::{ExactSum, FailureUpdate, LostToBreaks, Segments, Traffic};
+use crate::system::{ExactSum, FailureUpdate, Segments, Traffic};
 
 /// Data of time steps that processes share.
 pub(super) struct Shared {
@@ -18,7 +18,7 @@ pub(super) struct Outcome {
     /// Bonds that broke.
     pub broken: u64,
     /// Energy and area that they cost, where these are still to be added over processes.
-    pub lost: LostToBreaks,
+    pub lost: ExactSum,
 }
 
 impl Explicit<'_> {
@@ -87,13 +87,14 @@ impl Explicit<'_> {
         };
         let mut energies = [after.kinetic, after.kinetic_half, after.pair].map(single);
         let mut words = vec![outcome.broken as i64];
-        let lost = &mut outcome.lost;
         let powers = [&mut before.power, &mut after.power];
         let powers = powers
             .into_iter()
             .flat_map(|p| [&mut p.sum, &mut p.absolute]);
-        let spent = [&mut lost.energy, &mut lost.area];
-        let mut all: Vec<&mut ExactSum> = powers.chain(&mut energies).chain(spent).collect();
+        let mut all: Vec<&mut ExactSum> = powers
+            .chain(&mut energies)
+            .chain([&mut outcome.lost])
+            .collect();
         all.iter_mut().for_each(|sum| sum.extend(&mut words));
         system.add_into(&mut words);
         let parts = words[1..].chunks_exact(ExactSum::WORDS);

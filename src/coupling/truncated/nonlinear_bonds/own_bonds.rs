@@ -149,10 +149,10 @@ impl<const D: usize> NonlinearSeam<D> {
         }
     }
 
-    /// Bonds that broke here in the last pass and not in that of the body, of those that are counted here: their points, and which part of the bond each is.
-    pub(in crate::coupling) fn last_own(&self) -> impl Iterator<Item = ([u32; 2], f64)> + '_ {
-        self.broken_here().into_iter().map(|bond| {
-            let bond = bond as usize;
+    /// Broken bonds that the body has not: their points, and which part of the bond each is.
+    pub(in crate::coupling) fn broken_parts(&self) -> impl Iterator<Item = ([u32; 2], f64)> + '_ {
+        let broken = (0..self.own).filter(|&bond| !self.stands(bond as u32));
+        broken.map(|bond| {
             let parts = &self.parts[self.parts_of(bond)];
             (self.bonds[bond], parts.iter().map(|part| part.length).sum())
         })
