@@ -1,28 +1,26 @@
 //! Estimate of a run in time: its stable step, number of steps, memory and time, from a few steps taken.
 
+use std::sync::Arc;
 use std::time::Instant;
 
-use super::output_cost::{output_bytes, output_seconds};
+use super::output_cost::{TrialFolder, output_bytes, output_seconds};
 use super::resource_estimate::{MotionPrediction, Prediction, holds, warnings};
 use super::solver_estimate::Planned;
-use crate::coupling::impact::RESOLVED;
 use crate::model::Model;
+use crate::observe::checkpoint::{CheckpointFile, Fingerprint};
 use crate::observe::summary::{Decision, peak_memory_bytes, resident_memory_bytes};
 use crate::progress::Progress;
 use crate::run::RunError;
 use crate::run::budget::Share;
 use crate::run::equilibrium::{may_coarsen, may_factorise};
-use crate::run::loads::BodyForces;
-use crate::run::motion::STILL;
-use crate::run::motion::driven_impactors;
 use crate::run::motion::dynamic_system::start;
 use crate::run::motion::impact::impacted;
+use crate::run::motion::initial_state::PreStep;
 use crate::run::motion::saved::StepChoice;
 use crate::run::motion::setup::{ModelSetup, laid_out};
-use crate::run::motion::time_dependent_loads::SceneDrive;
-use crate::run::motion::time_step::{held, paced};
+use crate::run::motion::time_step::held;
 use crate::run::motion::writer::Moment;
-use crate::run::proof::growth::{GrowthQuestion, free_start};
+use crate::run::motion::{RunOptions, STILL};
 use crate::run::setup::sizes;
 use crate::scene::spec::LoadStepSpec;
 use crate::scene::{Explicit as Spec, QuasiStatic, Scene, Solve};
@@ -50,15 +48,17 @@ pub(crate) fn predict<const D: usize>(
     }
 }
 
-/// Predicts a run in time.
+/// Predicts a run in time, from the first steps of it.
 ///
 /// # Errors
 /// [`RunError`] as a run would, the refusal of its time step included.
 fn explicit<const D: usize>(
-    scene: Scene<D>,
+    mut scene: Scene<D>,
     spec: &Spec,
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
+    let folder = TrialFolder::new(&scene.output.directory);
+    scene.output.directory = folder.path().to_path_buf();
     let nothing = |_: &_, _: &mut Vec<Decision>| Ok(());
     laid_out(scene, None, progress, nothing, |laid_out, ()| {
         steps(laid_out, spec, progress)
@@ -134,54 +134,52 @@ fn steps<const D: usize>(
     spec: &Spec,
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
-    let (model, rest) = (laid_out.model, laid_out.rest);
-    let held = held(model, &rest.conditions)?;
-    let begin = start(model, rest);
-    let choices = &mut laid_out.choices;
-    let (moving, _) = impacted(model, rest, laid_out.moving, &begin, RESOLVED, choices)?;
-    let asked = GrowthQuestion {
+    let (model, operator, rest) = (laid_out.model, laid_out.operator, laid_out.rest);
+    let path = rest.output.directory.join("trial.checkpoint");
+    let mut begin = PreStep {
+        model,
+        operator,
+        rest,
+        spec,
+        moving: laid_out.moving,
+        terms: Arc::clone(&laid_out.terms),
         remedy: laid_out.remedy,
         proved: laid_out.proved,
-        policy: spec.growing_modes,
-        place: &|site| model.sites[site].position.iter().copied().collect(),
-        ranks: None,
-        free_from: free_start((model, rest), moving.is_linear, &begin)?,
-    };
-    let mut prescribed = held.clone();
-    prescribed.extend(driven_impactors::prescribed(
-        &rest.impactors,
-        model.sites.len(),
-    ));
-    let (moving, pace, growth) = paced(spec, &asked, moving, &prescribed, None, choices)?;
-    laid_out.proof.parts.extend(growth);
-    laid_out.moving = moving;
-    laid_out.watch.lap(&mut laid_out.timings, "stable step");
-
-    let is_linear = laid_out.moving.is_linear;
-    let steps = (pace.step, pace.steps);
-    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, steps, BodyForces::Lumped)?
-        .with_impactors(&rest.impactors, pace.steps);
-    let state_bytes = 12 * 8 * begin.u.len() as u64;
-    let mut motion = Explicit::new(
-        laid_out.moving.system.as_mut(),
-        &drive,
-        ExplicitParams::with_step(pace.step),
-        begin,
+        choices: &mut laid_out.choices,
+        timings: &mut laid_out.timings,
+        watch: &mut laid_out.watch,
+    }
+    .at_start(
+        RunOptions::default(),
+        CheckpointFile::new(path, Fingerprint::default()),
+        None,
     )?;
+    laid_out.proof.parts.extend(begin.growth);
+    let pace = begin.pace;
+    let state_bytes = 12 * 8 * begin.state.u.len() as u64;
+    let mut motion = Explicit::new(
+        begin.moving.system.as_mut(),
+        &begin.drive,
+        ExplicitParams::with_step(pace.step),
+        begin.state,
+    )?;
+    let is_linear = begin.moving.is_linear;
+    begin.recorder.begin(&Moment::of(&motion, is_linear));
+    laid_out.watch.lap(&mut laid_out.timings, "start");
     let seconds_per_step = seconds_per_step(&mut motion, pace.steps, is_linear)?;
-
-    // a row of the history asks for the energies
-    let begun = Instant::now();
-    motion.system().stored_energy(&motion.state().u);
-    let per_row = begun.elapsed().as_secs_f64();
+    // of a row of the history most is the energies
+    let clock = Instant::now();
+    begin.recorder.energies(&Moment::of(&motion, is_linear));
+    let per_row = clock.elapsed().as_secs_f64();
     drop(motion);
-    let [per_file, _] = output_seconds(model, laid_out.operator, rest, true)?;
+    laid_out.moving = begin.moving;
+    let [per_file, _] = output_seconds(model, operator, rest, true)?;
     progress.finish();
 
     let files = (spec.duration / spec.output_interval).ceil();
     let rows = (spec.duration / spec.history_interval).ceil();
     let timings = &mut laid_out.timings;
-    timings.add("start", per_row + per_file);
+    timings.add("start", per_file);
     timings.add("steps", pace.steps as f64 * seconds_per_step);
     timings.add(
         "output",
@@ -191,7 +189,7 @@ fn steps<const D: usize>(
         motion: Some(motion_of(model, &pace, seconds_per_step)),
         ..prediction(
             &laid_out,
-            held.len(),
+            held(model, &rest.conditions)?.len(),
             Some(Share::new("state", state_bytes)),
         )
     };
@@ -293,7 +291,9 @@ fn factors<const D: usize>(
     prediction.factor_nonzeros = plan.cost.factor_nnz;
     prediction.operations = plan.cost.flops;
     prediction.method = Some(plan.method);
-    prediction.peak_memory_bytes += plan.memory.iter().map(|s| s.bytes).sum::<u64>();
-    prediction.memory.extend(plan.memory);
+    prediction.peak_memory_bytes += plan.stiffness + plan.solver;
+    for (name, bytes) in [("stiffness", plan.stiffness), ("solver", plan.solver)] {
+        prediction.memory.push(Share::new(name, bytes));
+    }
     Ok(())
 }

@@ -64,7 +64,7 @@ impl Drop for TrialFolder {
     }
 }
 
-/// Seconds of one VTU file of a run, none without VTU, and of the tables of a run at rest; files are written with displacements that no compression finds easy.
+/// Seconds of one VTU file of a run, none without VTU, and of the tables of a run at rest; files are written where the run would, with displacements that no compression finds easy.
 ///
 /// # Errors
 /// [`ObserveError`] if nothing can be written, as a run would.
@@ -90,7 +90,6 @@ pub(crate) fn output_seconds<const D: usize>(
         sections: &[],
         stresses: (&rest.stresses, 0.0),
     };
-    let folder = TrialFolder::new(&rest.output.directory);
     let mut file = 0.0;
     if rest.output.vtu {
         let every = (model.mesh.cell_count() + model.sites.len())
@@ -99,7 +98,7 @@ pub(crate) fn output_seconds<const D: usize>(
         let begun = Instant::now();
         let shown = snapshot(&solved, &[], rest.output.points, Shown::Every(every));
         write_vtu(
-            &folder.path().join("trial.vtu"),
+            &rest.output.directory.join("trial.vtu"),
             &shown,
             Compression::default(),
         )?;
@@ -109,7 +108,6 @@ pub(crate) fn output_seconds<const D: usize>(
         return Ok([file, 0.0]);
     }
     let tables = Output {
-        directory: folder.path().to_path_buf(),
         vtu: false,
         ..rest.output.clone()
     };

@@ -92,47 +92,39 @@ fn shares<const D: usize>(
     let rows = has_rows.then(|| model.assemble(&operator, progress));
     let spreading = match &rows {
         Some(rows) => of_statics(&model, coupling.as_ref(), rows, rest.solver.method),
-        None if has_own_families => Spreading::Families,
+        None if has_own_families && !is_static => Spreading::Families,
         None => Spreading::Work,
     };
     let moves_own = (explicit.as_ref()).is_some_and(|spec| moves_own_sites(spec, &rest));
-    let system = match moves_own {
-        true => {
-            let start = LayoutStart {
-                sharing: Sharing::Steps,
-                ..LayoutStart::default()
-            };
-            let (coupling, choices) = (coupling.as_ref(), &mut Vec::new());
-            let operator = &operator;
-            let moving = dynamic(&model, coupling, operator, &rest, start, choices, progress)?;
-            Some(moving.system)
-        }
-        false => None,
-    };
+    let mut system = None;
+    if moves_own {
+        let start = LayoutStart {
+            sharing: Sharing::Steps,
+            ..LayoutStart::default()
+        };
+        let (coupling, told) = (coupling.as_ref(), &mut Vec::new());
+        system = Some(dynamic(&model, coupling, &operator, &rest, start, told, progress)?.system);
+    }
     let work = model.work_of_sites();
     let of_rank = |rank: usize| {
         let sites = partition.of(rank);
         let own = (0..model.sites.len() as u32).map(|site| partition.owner(site) == rank);
         let own: Vec<bool> = own.collect();
-        let (reached, blocks) = match (&rows, &system) {
-            (Some(rows), _) => of_rows(rows, sites, &own),
-            (None, system) => (
+        let (reached, blocks) = match &rows {
+            Some(rows) => of_rows(rows, sites, &own),
+            None => {
+                let reached = system.as_ref().and_then(|s| s.sites_reached(&own));
+                let blocks = sites.iter().map(|&i| work[i as usize] as usize).sum();
                 // else forces are gathered
-                (system
-                    .as_ref()
-                    .and_then(|system| system.sites_reached(&own)))
-                .unwrap_or_else(|| vec![true; own.len()]),
-                sites.iter().map(|&i| work[i as usize] as usize).sum(),
-            ),
+                (reached.unwrap_or_else(|| vec![true; own.len()]), blocks)
+            }
         };
         let ghosts = reached.iter().filter(|is_reached| **is_reached).count() - sites.len();
-        let scalars = D
-            * D
-            * match spreading {
-                Spreading::Work | Spreading::Families => 0,
-                Spreading::Products => sites.len() * 3usize.pow(D as u32),
-                Spreading::Factors | Spreading::Rows => blocks,
-            };
+        let stored = match spreading {
+            Spreading::Work | Spreading::Families => 0,
+            Spreading::Products => sites.len() * 3usize.pow(D as u32),
+            Spreading::Factors | Spreading::Rows => blocks,
+        };
         ProcessShare {
             sites: sites.len(),
             ghosts,
@@ -141,7 +133,7 @@ fn shares<const D: usize>(
                 true => bonds_held(&model, &own),
                 false => model.bond_count(),
             },
-            stiffness_bytes: scalars as u64 * SCALAR,
+            stiffness_bytes: (stored * D * D) as u64 * SCALAR,
             received_bytes: (ghosts * D * 8) as u64,
             memory_bytes: 0,
         }

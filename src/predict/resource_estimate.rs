@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use super::error_prediction::ErrorPrediction;
-use super::output_cost::{output_bytes, output_seconds};
+use super::output_cost::{TrialFolder, output_bytes, output_seconds};
 use super::solver_estimate::Planned;
 use crate::mesh::Mesh;
 use crate::model::zone_distance::Edge;
@@ -136,12 +136,14 @@ const PROGRAM: u64 = 3_700_000;
 /// # Errors
 /// [`RunError`] if the model cannot be built or a condition meets no site, as a run would.
 pub(crate) fn predict<const D: usize>(
-    scene: Scene<D>,
+    mut scene: Scene<D>,
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
+    let folder = TrialFolder::new(&scene.output.directory);
+    scene.output.directory = folder.path().to_path_buf();
     let (mut timings, mut watch) = (Timings::default(), Stopwatch::start());
     let (title, traits) = (scene.title.clone(), scene.coupling.traits());
-    let (nodes, cells) = (scene.mesh.nodes.len(), scene.mesh.cell_count());
+    let counts = [scene.mesh.nodes.len(), scene.mesh.cell_count()];
     let (problem, rest) = setup::problem(scene);
     let (model, coupling) = setup::model(problem, &rest, progress)?;
     let operator = coupling.operator(&model)?;
@@ -165,40 +167,31 @@ pub(crate) fn predict<const D: usize>(
     watch.lap(&mut timings, "proof");
     let mut choices: Vec<_> = rest.choices.iter().chain(&rest.placed).cloned().collect();
     choices.push(rest.coupling(traits));
-    let asymmetry = || stiffness.asymmetry();
-    let symmetry = equilibrium::symmetry(coupling.as_ref(), asymmetry, &mut choices);
+    let symmetry = equilibrium::symmetry(coupling.as_ref(), || stiffness.asymmetry(), &mut choices);
     terms.rows.add_to(&mut stiffness);
     let free = FreeDofs::from_prescribed(&prescribed, D);
     let plan = Planned::of(&model, &stiffness, &free, &rest, symmetry)?;
     watch.lap(&mut timings, "conditions and ordering");
     progress.finish();
-
     // led by the factors of the stiffness, where these are worth their cost
-    let method = match rest.nonlinear(&model) {
-        None => plan.method,
-        Some(_) => MethodUsed::Newton,
-    };
+    let nonlinear = rest.nonlinear(&model);
+    let method = nonlinear.map_or(plan.method, |_| MethodUsed::Newton);
     choices.extend(body.decisions(method, symmetry, free.count()));
     choices.extend(weights_decision(&model));
-    let sizes = Sizes {
-        nodes,
-        cells,
-        nonzeros: stiffness.nonzeros(),
-        ..setup::sizes(&model, &operator)
-    };
+    let sizes = body.sizes(counts, stiffness.nonzeros());
     plan.add_seconds(&mut timings);
     let output = output_seconds(&model, &operator, &rest, false)?;
     timings.add("output", output.iter().sum());
-    let output = Share::new("output", output_bytes(&sizes, &rest.output));
+    let output = output_bytes(&sizes, &rest.output);
     let base_bytes = laid_out + PROGRAM;
-    let [of_stiffness, of_solver] = &plan.memory;
-    let peak = base_bytes + of_stiffness.bytes + of_solver.bytes.max(output.bytes);
-    let mut memory = vec![
-        Share::new("model", laid_out),
-        Share::new("program", PROGRAM),
+    let peak = base_bytes + plan.stiffness + plan.solver.max(output);
+    let items = [
+        ("model", laid_out),
+        ("program", PROGRAM),
+        ("stiffness", plan.stiffness),
+        ("solver", plan.solver),
+        ("output", output),
     ];
-    memory.extend(plan.memory);
-    memory.push(output);
     let mut prediction = Prediction {
         scene: title,
         dimension: D,
@@ -210,7 +203,7 @@ pub(crate) fn predict<const D: usize>(
         factor_nonzeros: plan.cost.factor_nnz,
         operations: plan.cost.flops,
         peak_memory_bytes: peak.max(layout_peak),
-        memory,
+        memory: items.map(|(name, bytes)| Share::new(name, bytes)).to_vec(),
         base_bytes,
         total_seconds: timings.total(),
         timings,

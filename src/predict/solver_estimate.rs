@@ -5,7 +5,6 @@ use std::time::Duration;
 use crate::model::Model;
 use crate::observe::summary::Timings;
 use crate::run::RunError;
-use crate::run::budget::Share;
 use crate::run::equilibrium;
 use crate::run::setup::RunSettings;
 use crate::solve::FreeDofs;
@@ -47,8 +46,10 @@ pub(crate) struct Planned {
     pub method: MethodUsed,
     /// Cost of the factors; nothing of an iterative method.
     pub cost: FactorCost,
-    /// Bytes of the stiffness, and of the factors or the multigrid hierarchy.
-    pub memory: [Share; 2],
+    /// Bytes of the stiffness.
+    pub stiffness: u64,
+    /// Bytes of the factors, or of the multigrid hierarchy.
+    pub solver: u64,
 }
 
 impl Planned {
@@ -89,10 +90,8 @@ impl Planned {
             nonzeros,
             method,
             cost,
-            memory: [
-                Share::new("stiffness", stored as u64),
-                Share::new("solver", solver as u64),
-            ],
+            stiffness: stored as u64,
+            solver: solver as u64,
         })
     }
 

@@ -417,8 +417,8 @@ fn remedy<const D: usize>(scene: &Scene<D>, counts: &Counts, there: u64) -> Stri
 const SEARCH: f64 = 4e-7;
 /// The same per bond of a body that moves: its traversals, and the stable step from its rows.
 const SET_UP: f64 = 2.5e-6;
-/// The same per scalar of the stiffness: computed, dropped, ordered.
-const PATTERN: f64 = 1.8e-7;
+/// The same per scalar of the stiffness: assembled, ordered.
+const ASSEMBLY: f64 = 1.8e-7;
 /// The same per scalar of an iterative solve.
 const SOLVE: f64 = 2.4e-7;
 /// The same per bond and step.
@@ -430,7 +430,7 @@ impl Counts {
         let threads = rayon::current_num_threads() as f64;
         let (lay_out, run) = match &scene.solve {
             Solve::Static => (
-                SEARCH * self.searched + PATTERN * self.nonzeros,
+                SEARCH * self.searched + ASSEMBLY * self.nonzeros,
                 SOLVE * self.nonzeros,
             ),
             Solve::Explicit(solve) => {

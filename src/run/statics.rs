@@ -113,7 +113,7 @@ fn solve_chosen<const D: usize>(
 ) -> Result<RunSummary, RunError> {
     let (mut timings, mut watch) = (Timings::default(), Stopwatch::start());
     let (name, traits) = (scene.title.clone(), scene.coupling.traits());
-    let (nodes, cells) = (scene.mesh.nodes.len(), scene.mesh.cell_count());
+    let counts = [scene.mesh.nodes.len(), scene.mesh.cell_count()];
     if let Some(placement) = &scene.placement {
         timings.add("placing the zone", placement.seconds);
     }
@@ -155,9 +155,7 @@ fn solve_chosen<const D: usize>(
         }
     };
     watch = Stopwatch::start();
-    let info = &equilibrium.solution.info;
-    choices.extend(equilibrium.choices.iter().cloned());
-    choices.extend(body.decisions(info.method, equilibrium.symmetry, info.free_dofs));
+    choices.extend(body.told(equilibrium));
     let residual = equilibrium.residual();
     let sections = body.section_forces(&residual, &equilibrium.solution.displacement)?;
     let solved = Solved {
@@ -176,12 +174,7 @@ fn solve_chosen<const D: usize>(
     progress.finish();
     Ok(RunSummary {
         scene: name,
-        sizes: Sizes {
-            nodes,
-            cells,
-            nonzeros: equilibrium.solution.info.matrix_nnz,
-            ..sizes(model, &operator)
-        },
+        sizes: body.sizes(counts, equilibrium.solution.info.matrix_nnz),
         choices,
         total_seconds: timings.total(),
         timings,
@@ -302,6 +295,13 @@ impl<const D: usize> StaticBody<'_, D> {
         Ok((solved, proof))
     }
 
+    /// Decisions made up to an equilibrium, and the properties of the model.
+    fn told(&self, equilibrium: &Equilibrium) -> Vec<Decision> {
+        let info = &equilibrium.solution.info;
+        let made = self.decisions(info.method, equilibrium.symmetry, info.free_dofs);
+        equilibrium.choices.iter().cloned().chain(made).collect()
+    }
+
     /// Decisions made for the solution, and the properties of the model.
     pub fn decisions(
         &self,
@@ -414,6 +414,16 @@ impl<const D: usize> StaticBody<'_, D> {
     fn section_forces(&self, residual: &[f64], u: &[f64]) -> Result<Vec<SectionForce>, RunError> {
         let sections = Sections::new(self.model, self.rest)?;
         Ok(sections.forces(residual, u, 0.0))
+    }
+
+    /// Sizes of a model whose mesh has so many nodes and cells.
+    pub fn sizes(&self, [nodes, cells]: [usize; 2], nonzeros: usize) -> Sizes {
+        Sizes {
+            nodes,
+            cells,
+            nonzeros,
+            ..sizes(self.model, self.operator)
+        }
     }
 
     /// The force of each condition that holds dofs.
