@@ -57,10 +57,11 @@ pub use term::{ForceTerm, RateBounds};
 pub use with_terms::WithTerms;
 
 /// Symmetry of the tangent of a system; solvers choose by it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Symmetry {
     /// `K = Kᵀ` to round-off: Cholesky and conjugate gradients are valid.
+    #[default]
     Symmetric,
     /// `K ≠ Kᵀ` (splice, blending and partial stress): LU and GMRES are valid, plain CG is wrong.
     Unsymmetric,

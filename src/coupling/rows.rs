@@ -132,22 +132,4 @@ impl<const D: usize> Model<D> {
             |r, row| operator.add_row(sites[r] as usize, row),
         )
     }
-
-    /// The pattern of the stiffness, without its values, and its products with `fields`.
-    pub fn pattern(
-        &self,
-        operator: &Operator<'_, D>,
-        fields: &[Vec<f64>],
-        progress: &dyn Progress,
-    ) -> assembly::Pattern {
-        progress.stage("pattern", Some(self.sites.len() as u64));
-        let pattern = assembly::pattern(
-            self.sites.len(),
-            fields,
-            |by| progress.advance(by),
-            |site, row| self.add_scaled_row(operator, site, row),
-        );
-        progress.finish();
-        pattern
-    }
 }

@@ -1,7 +1,6 @@
 //! Resources of a run, counted from volumes: the estimate where laying the model out would take longer than a check may.
 
 use super::resource_estimate::Prediction;
-use crate::observe::proof::Proof;
 use crate::observe::summary::{Decision, Sizes, Timings};
 use crate::run::budget::Counts;
 use crate::scene::Scene;
@@ -46,26 +45,17 @@ pub(crate) fn counted<const D: usize>(scene: &Scene<D>) -> Option<Prediction> {
             dofs: whole(counts.dofs),
             nonzeros: whole(counts.nonzeros),
         },
-        method: None,
         symmetry: scene
             .coupling
             .build(scene.point_law.linearised())
             .symmetry(),
         unknowns: whole(counts.dofs),
-        factor_nonzeros: 0,
-        operations: 0.0,
         peak_memory_bytes: counts.peak(),
         base_bytes: counts.base(),
         memory: counts.memory(),
         total_seconds: timings.total(),
         timings,
         choices,
-        proof: Proof::default(),
-        warnings: Vec::new(),
-        error: None,
-        no_error: None,
-        motion: None,
-        processes: Vec::new(),
-        distribution: String::new(),
+        ..Prediction::default()
     })
 }

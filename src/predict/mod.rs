@@ -6,11 +6,10 @@
 //! | `solver_estimate.rs` | cost of solving with a stiffness |
 //! | `motion_estimate.rs` | of one that moves |
 //! | `counted.rs` | the same from volumes, where the model is too large to be laid out |
-//! | `output_cost.rs` | cost of the outputs |
+//! | `output_cost.rs` | memory and time of the outputs |
 //! | `display.rs` | a prediction, as people read it |
 //! | `error_prediction.rs` | an error, predicted |
 //! | `processes.rs` | share of each of several processes |
-//! | `process_share.rs` | the same in numbers |
 //! | `process_memory.rs` | the memory of each |
 
 pub mod counted;
@@ -19,15 +18,13 @@ mod error_prediction;
 mod motion_estimate;
 pub mod output_cost;
 mod process_memory;
-mod process_share;
 mod processes;
 mod resource_estimate;
 mod solver_estimate;
 
 pub use error_prediction::{ErrorPrediction, ErrorReference};
-pub use process_share::ProcessShare;
 pub use processes::{Processes, processes};
-pub use resource_estimate::{MotionPrediction, Prediction};
+pub use resource_estimate::{MotionPrediction, Prediction, ProcessShare};
 
 use crate::progress::Progress;
 use crate::run::chosen::with_choice;

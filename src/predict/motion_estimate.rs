@@ -3,55 +3,35 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::output_cost::{TrialFolder, file_seconds, made_up};
+use super::output_cost::{TrialFolder, output_bytes, output_seconds};
 use super::resource_estimate::{MotionPrediction, Prediction, holds, warnings};
-use super::solver_estimate::{Planned, output_bytes};
-use crate::coupling::impact::RESOLVED;
+use super::solver_estimate::Planned;
+use crate::model::Model;
 use crate::observe::checkpoint::{CheckpointFile, Fingerprint};
-use crate::observe::series::Series;
 use crate::observe::summary::{Decision, peak_memory_bytes, resident_memory_bytes};
 use crate::progress::Progress;
+use crate::run::RunError;
 use crate::run::budget::Share;
 use crate::run::equilibrium::{may_coarsen, may_factorise};
-use crate::run::loads::BodyForces;
-use crate::run::motion::STILL;
-use crate::run::motion::breaks::{Breaks, breaks};
-use crate::run::motion::driven_impactors;
 use crate::run::motion::dynamic_system::start;
-use crate::run::motion::explicit::sizes;
 use crate::run::motion::impact::impacted;
-use crate::run::motion::impact_record::ImpactRecord;
+use crate::run::motion::initial_state::PreStep;
 use crate::run::motion::saved::StepChoice;
 use crate::run::motion::setup::{ModelSetup, laid_out};
-use crate::run::motion::time_dependent_loads::SceneDrive;
-use crate::run::motion::time_step::{held, paced};
-use crate::run::motion::writer::{Moment, Recorder};
-use crate::run::proof::growth::{GrowthQuestion, free_start};
-use crate::run::setup::RunSettings;
-use crate::run::solution::{self, Moved, Solved};
-use crate::run::{RunError, RunOptions};
+use crate::run::motion::time_step::held;
+use crate::run::motion::writer::Moment;
+use crate::run::motion::{RunOptions, STILL};
+use crate::run::setup::sizes;
 use crate::scene::spec::LoadStepSpec;
-use crate::scene::{Explicit as Spec, QuasiStatic, Solve};
-use crate::scene::{Output, Scene};
+use crate::scene::{Explicit as Spec, QuasiStatic, Scene, Solve};
 use crate::solve::FreeDofs;
 use crate::solve::explicit::{Explicit, ExplicitParams};
-use crate::solve::statics::MethodUsed;
-use crate::{
-    coupling::{Impact, Operator},
-    model::{Model, Sampler},
-};
 
-/// Steps are tried for a tenth of the run to measure the duration of one, for this long at most \[s\].
-const TRIED_FOR: f64 = 0.5;
-
-/// Shortest time for which steps are tried \[s\].
-const LEAST_TRIED: f64 = 0.01;
+/// Steps are tried for so long \[s\].
+const TRIED_FOR: f64 = 0.2;
 
 /// Steps before the clock starts.
 const WARM: u64 = 3;
-
-/// Rows of the history that are timed.
-const ROWS: u32 = 5;
 
 /// Predicts a run in time or under a load that grows.
 ///
@@ -68,56 +48,52 @@ pub(crate) fn predict<const D: usize>(
     }
 }
 
-/// Predicts a run in time.
+/// Predicts a run in time, from the first steps of it.
 ///
 /// # Errors
 /// [`RunError`] as a run would, the refusal of its time step included.
 fn explicit<const D: usize>(
-    scene: Scene<D>,
+    mut scene: Scene<D>,
     spec: &Spec,
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
+    let folder = TrialFolder::new(&scene.output.directory);
+    scene.output.directory = folder.path().to_path_buf();
     let nothing = |_: &_, _: &mut Vec<Decision>| Ok(());
     laid_out(scene, None, progress, nothing, |laid_out, ()| {
         steps(laid_out, spec, progress)
     })
 }
 
-/// Sizes, memory and the choices so far, as they stand with what moves.
+/// Sizes, memory and the choices so far, as they stand with what moves; `state` has its own bytes.
 fn prediction<const D: usize>(
     laid_out: &ModelSetup<'_, D>,
     held: usize,
-    files: Files,
-    state: Option<u64>,
+    state: Option<Share>,
 ) -> Prediction {
     let sizes = sizes(laid_out.model, laid_out.operator);
-    let output = match files {
-        Files::Some => output_bytes(&sizes, &laid_out.rest.output),
-        Files::None => 0,
+    let output = match laid_out.rest.output.vtu || state.is_none() {
+        true => output_bytes(&sizes, &laid_out.rest.output),
+        false => 0,
     };
     let peak = peak_memory_bytes().unwrap_or(0);
-    let share = |name, bytes| Share { name, bytes };
     let mut memory = vec![
-        share("model", laid_out.bytes),
-        share("rows, bonds", laid_out.moving.bytes as u64),
+        Share::new("model", laid_out.bytes),
+        Share::new("rows, bonds", laid_out.moving.bytes as u64),
     ];
-    memory.extend(state.map(|bytes| share("state", bytes)));
-    memory.push(share("output", output));
+    memory.extend(state);
+    memory.push(Share::new("output", output));
     let mut choices = vec![laid_out.rest.coupling(laid_out.traits)];
     // a coupling that was chosen is told already
     let told = choices[0].clone();
     choices.extend(laid_out.choices.iter().filter(|c| **c != told).cloned());
     Prediction {
         scene: laid_out.title.clone(),
-        counted: None,
         dimension: D,
         coupling: laid_out.traits.name.to_owned(),
         sizes,
-        method: None,
         symmetry: laid_out.moving.system.symmetry(),
         unknowns: sizes.dofs - held,
-        factor_nonzeros: 0,
-        operations: 0.0,
         peak_memory_bytes: (resident_memory_bytes().unwrap_or(0) + output).max(peak),
         memory,
         base_bytes: peak,
@@ -125,20 +101,8 @@ fn prediction<const D: usize>(
         timings: laid_out.timings.clone(),
         choices,
         proof: laid_out.proof.clone(),
-        warnings: Vec::new(),
-        error: None,
-        no_error: None,
-        motion: None,
-        processes: Vec::new(),
-        distribution: String::new(),
+        ..Prediction::default()
     }
-}
-
-/// Presence of VTU files in the output of a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Files {
-    Some,
-    None,
 }
 
 /// Seconds of a step, from a few that are taken.
@@ -151,114 +115,17 @@ fn seconds_per_step(
     is_linear: bool,
 ) -> Result<f64, RunError> {
     // the first touch memory, and wake threads
-    let mut taken = 0u64;
-    let mut clock = Instant::now();
-    let mut tried = TRIED_FOR;
-    while taken < steps && (taken < 2 * WARM || clock.elapsed().as_secs_f64() < tried) {
+    let (mut taken, mut clock) = (0, Instant::now());
+    while taken < steps && (taken < 2 * WARM || clock.elapsed().as_secs_f64() < TRIED_FOR) {
         motion.step()?;
         Moment::of(motion, is_linear);
         taken += 1;
         if taken == WARM {
-            let run = clock.elapsed().as_secs_f64() / WARM as f64 * steps as f64;
-            tried = (0.1 * run).clamp(LEAST_TRIED, TRIED_FOR);
             clock = Instant::now();
         }
     }
     let timed = if taken > WARM { taken - WARM } else { taken };
     Ok(clock.elapsed().as_secs_f64() / timed as f64)
-}
-
-/// Seconds that output takes.
-struct OutputCost {
-    /// Seconds of opening the history and its first row.
-    opened: f64,
-    per_row: f64,
-    per_file: f64,
-}
-
-impl OutputCost {
-    /// Writes rows and a sample of a file as the run does, elsewhere; `count` files are wanted, none without VTU.
-    ///
-    /// # Errors
-    /// [`RunError`] if they cannot be written.
-    #[expect(clippy::too_many_arguments, reason = "each is another part of the run")]
-    fn of<const D: usize>(
-        model: &Model<D>,
-        operator: &Operator<'_, D>,
-        rest: &RunSettings<D>,
-        impact: Option<Arc<Impact<D>>>,
-        breaks: Breaks,
-        is_linear: bool,
-        shown: &Moment<'_>,
-        count: Option<f64>,
-    ) -> Result<Self, RunError> {
-        let folder = TrialFolder::new(&rest.output.directory);
-        let output = Output {
-            directory: folder.path().to_path_buf(),
-            ..rest.output.clone()
-        };
-        let begun = Instant::now();
-        let mut recorder = Recorder::new(
-            &output,
-            &rest.conditions,
-            &Sampler::new(model),
-            impact.map(|impact| ImpactRecord::new(impact, &rest.impactors, None)),
-            breaks,
-            is_linear,
-            CheckpointFile::new(
-                folder.path().join("trial.checkpoint"),
-                Fingerprint::default(),
-            ),
-            RunOptions::default(),
-            None,
-        )?;
-        recorder.begin(shown);
-        let place = |site: usize| model.sites[site].position;
-        let energies = recorder.energies(shown);
-        let probed = recorder.unprobed();
-        recorder.row(shown, energies, &probed, place)?;
-        let opened = begun.elapsed().as_secs_f64();
-        let begun = Instant::now();
-        for _ in 0..ROWS {
-            let energies = recorder.energies(shown);
-            recorder.row(shown, energies, &probed, place)?;
-        }
-        let per_row = begun.elapsed().as_secs_f64() / f64::from(ROWS);
-        let per_file = if let Some(count) = count {
-            let u = made_up(shown.state.u.len());
-            let solved = Solved {
-                model,
-                operator,
-                displacement: &u,
-                residual: &[],
-                zone_of_site: &solution::zone_of_site(model),
-                system: None,
-                moved: Moved {
-                    velocity: Some(&u),
-                    ..Moved::default()
-                },
-                sections: &[],
-                stresses: (&rest.stresses, 0.0),
-            };
-            let mut series = Series::new(folder.path(), "trial");
-            file_seconds(&solved, &rest.output, count, |s| {
-                series.push(0.0, s).map(drop)
-            })?
-        } else {
-            0.0
-        };
-        Ok(Self {
-            opened,
-            per_row,
-            per_file,
-        })
-    }
-}
-
-/// Files that a run writes; none without VTU.
-fn files_of<const D: usize>(spec: &Spec, rest: &RunSettings<D>) -> Option<f64> {
-    let count = (spec.duration / spec.output_interval).ceil() + 1.0;
-    rest.output.vtu.then_some(count)
 }
 
 /// Sizes, memory and time of the steps of a run, from some that are taken.
@@ -267,83 +134,68 @@ fn steps<const D: usize>(
     spec: &Spec,
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
-    let (model, rest) = (laid_out.model, laid_out.rest);
-    let held = held(model, &rest.conditions)?;
-    let begin = start(model, rest);
-    let choices = &mut laid_out.choices;
-    let (moving, impact) = impacted(model, rest, laid_out.moving, &begin, RESOLVED, choices)?;
-    let asked = GrowthQuestion {
-        remedy: laid_out.remedy,
-        proved: laid_out.proved,
-        policy: spec.growing_modes,
-        place: &|site| model.sites[site].position.iter().copied().collect(),
-        ranks: None,
-        free_from: free_start((model, rest), moving.is_linear, &begin)?,
-    };
-    let mut prescribed = held.clone();
-    prescribed.extend(driven_impactors::prescribed(
-        &rest.impactors,
-        model.sites.len(),
-    ));
-    let (moving, pace, growth) = paced(spec, &asked, moving, &prescribed, None, choices)?;
-    laid_out.proof.parts.extend(growth);
-    laid_out.moving = moving;
-    laid_out.watch.lap(&mut laid_out.timings, "stable step");
-
-    let is_linear = laid_out.moving.is_linear;
-    let breaks = breaks(laid_out.moving.system.as_ref(), rest);
-    let steps = (pace.step, pace.steps);
-    let drive = SceneDrive::new(model, &rest.conditions, &begin.u, steps, BodyForces::Lumped)?
-        .with_impactors(&rest.impactors, pace.steps);
-    let state_bytes = 12 * 8 * begin.u.len() as u64;
-    let mut motion = Explicit::new(
-        laid_out.moving.system.as_mut(),
-        &drive,
-        ExplicitParams::with_step(pace.step),
-        begin,
-    )?;
-    let seconds_per_step = seconds_per_step(&mut motion, pace.steps, is_linear)?;
-
-    let shown = Moment::of(&motion, is_linear);
-    let operator = laid_out.operator;
-    let cost = OutputCost::of(
+    let (model, operator, rest) = (laid_out.model, laid_out.operator, laid_out.rest);
+    let path = rest.output.directory.join("trial.checkpoint");
+    let mut begin = PreStep {
         model,
         operator,
         rest,
-        impact,
-        breaks,
-        is_linear,
-        &shown,
-        files_of(spec, rest),
+        spec,
+        moving: laid_out.moving,
+        terms: Arc::clone(&laid_out.terms),
+        remedy: laid_out.remedy,
+        proved: laid_out.proved,
+        choices: &mut laid_out.choices,
+        timings: &mut laid_out.timings,
+        watch: &mut laid_out.watch,
+    }
+    .at_start(
+        RunOptions::default(),
+        CheckpointFile::new(path, Fingerprint::default()),
+        None,
     )?;
+    laid_out.proof.parts.extend(begin.growth);
+    let pace = begin.pace;
+    let state_bytes = 12 * 8 * begin.state.u.len() as u64;
+    let mut motion = Explicit::new(
+        begin.moving.system.as_mut(),
+        &begin.drive,
+        ExplicitParams::with_step(pace.step),
+        begin.state,
+    )?;
+    let is_linear = begin.moving.is_linear;
+    begin.recorder.begin(&Moment::of(&motion, is_linear));
+    laid_out.watch.lap(&mut laid_out.timings, "start");
+    let seconds_per_step = seconds_per_step(&mut motion, pace.steps, is_linear)?;
+    // of a row of the history most is the energies
+    let clock = Instant::now();
+    begin.recorder.energies(&Moment::of(&motion, is_linear));
+    let per_row = clock.elapsed().as_secs_f64();
     drop(motion);
+    laid_out.moving = begin.moving;
+    let [per_file, _] = output_seconds(model, operator, rest, true)?;
     progress.finish();
 
-    let (files, written) = match files_of(spec, rest) {
-        Some(count) => (Files::Some, count),
-        None => (Files::None, 0.0),
-    };
+    let files = (spec.duration / spec.output_interval).ceil();
+    let rows = (spec.duration / spec.history_interval).ceil();
     let timings = &mut laid_out.timings;
-    timings.add("start", cost.opened + cost.per_file);
+    timings.add("start", per_file);
     timings.add("steps", pace.steps as f64 * seconds_per_step);
-    let rows = rows_of(spec, &pace);
     timings.add(
         "output",
-        (written - 1.0).max(0.0) * cost.per_file + rows * cost.per_row,
+        files * per_file + rows.min(pace.steps as f64) * per_row,
     );
     let mut prediction = Prediction {
         motion: Some(motion_of(model, &pace, seconds_per_step)),
-        ..prediction(&laid_out, held.len(), files, Some(state_bytes))
+        ..prediction(
+            &laid_out,
+            held(model, &rest.conditions)?.len(),
+            Some(Share::new("state", state_bytes)),
+        )
     };
     prediction.warnings = warnings(model, laid_out.rest, laid_out.traits, &prediction)?;
     holds(&prediction)?;
     Ok(prediction)
-}
-
-/// Rows of the history that a run writes.
-fn rows_of(spec: &Spec, pace: &StepChoice) -> f64 {
-    let rows = (spec.duration / spec.history_interval).ceil();
-    rows.min(pace.steps as f64) + 1.0
 }
 
 /// The steps of a run.
@@ -390,7 +242,7 @@ pub(crate) fn load_steps<const D: usize>(
         )?;
         laid_out.moving = moving;
         progress.finish();
-        let mut prediction = prediction(&laid_out, held.len(), Files::Some, None);
+        let mut prediction = prediction(&laid_out, held.len(), None);
         factors(&laid_out, spec, &held, &mut prediction, progress)?;
         prediction.warnings =
             warnings(laid_out.model, laid_out.rest, laid_out.traits, &prediction)?;
@@ -431,18 +283,17 @@ fn factors<const D: usize>(
     held.iter()
         .for_each(|&dof| prescribed[dof as usize] = Some(0.0));
     let free = FreeDofs::from_prescribed(&prescribed, D);
-    let pattern = laid_out.model.pattern(laid_out.operator, &[], progress);
-    let plan = Planned::of(laid_out.model, &pattern, &free, laid_out.rest, symmetry)?;
-    if matches!(plan.method, MethodUsed::Cholesky | MethodUsed::Lu) {
-        prediction.factor_nonzeros = plan.cost.factor_nnz;
-        prediction.operations = plan.cost.flops;
-    } else if !coarsens {
+    let stiffness = model.assemble(laid_out.operator, progress);
+    let plan = Planned::of(model, &stiffness, &free, laid_out.rest, symmetry)?;
+    if !(plan.is_factorised() || coarsens) {
         return Ok(());
     }
+    prediction.factor_nonzeros = plan.cost.factor_nnz;
+    prediction.operations = plan.cost.flops;
     prediction.method = Some(plan.method);
+    prediction.peak_memory_bytes += plan.stiffness + plan.solver;
     for (name, bytes) in [("stiffness", plan.stiffness), ("solver", plan.solver)] {
-        prediction.memory.push(Share { name, bytes });
-        prediction.peak_memory_bytes += bytes;
+        prediction.memory.push(Share::new(name, bytes));
     }
     Ok(())
 }

@@ -4,20 +4,34 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
+use crate::coupling::Operator;
+use crate::model::Model;
 use crate::observe::ObserveError;
-use crate::observe::vtu::{Compression, Snapshot, write_vtu};
-use crate::run::solution::Solved;
+use crate::observe::summary::Sizes;
+use crate::observe::vtu::{Compression, write_vtu};
+use crate::run::setup::RunSettings;
+use crate::run::solution::{Moved, Solved, zone_of_site};
 use crate::run::write::{Shown, snapshot, write};
 use crate::scene::Output;
+use crate::scene::spec::PointOutputSpec;
 
-/// Cells and points of the larger of two trial files, at least.
-const SHOWN: usize = 1500;
+/// Cells and points of a trial file at most.
+const SHOWN: usize = 50_000;
 
-/// The same of the smaller one, which gives the cost of a file however little it holds.
-const FEW: usize = 150;
+/// Bytes per cell and point of the output while it is encoded: fields, their copy for the encoder, its text.
+const OUTPUT_BYTES: u64 = 900;
 
-/// Of all files of a run together, the larger trial file may be this share.
-const SHARE: f64 = 0.05;
+/// Bytes per further corner of a point that is shown as a cell: its position and fields, their copy, its text.
+const CORNER_BYTES: u64 = 250;
+
+/// Bytes of the output while it is encoded.
+pub(crate) fn output_bytes<const D: usize>(sizes: &Sizes, output: &Output<D>) -> u64 {
+    let corners = match output.points {
+        PointOutputSpec::Vertices => 0,
+        PointOutputSpec::Cells => ((1 << D) - 1) * sizes.points as u64,
+    };
+    OUTPUT_BYTES * (sizes.cells + sizes.points) as u64 + CORNER_BYTES * corners
+}
 
 /// Folders so far, so that each has a name of its own.
 static FOLDERS: AtomicUsize = AtomicUsize::new(0);
@@ -50,85 +64,61 @@ impl Drop for TrialFolder {
     }
 }
 
-/// A displacement that no compression finds easy.
-pub(crate) fn made_up(dofs: usize) -> Vec<f64> {
-    (0..dofs)
-        .map(|k| 1e-3 * (1.7 * k as f64 + 0.3 * (k as f64).sqrt()).sin())
-        .collect()
-}
-
-/// Seconds of one VTU file of a run that writes `files` by `write`, from two files of a part of its cells and points.
-///
-/// # Errors
-/// [`ObserveError`] if nothing can be written, as a run would.
-pub(crate) fn file_seconds<const D: usize>(
-    solved: &Solved<'_, D>,
-    output: &Output<D>,
-    files: f64,
-    mut write: impl FnMut(Snapshot) -> Result<(), ObserveError>,
-) -> Result<f64, ObserveError> {
-    let all = (solved.model.mesh.cell_count() + solved.model.sites.len()) as f64;
-    let mut trial = |wanted: f64| -> Result<(f64, f64), ObserveError> {
-        let every = (all / wanted).floor().max(1.0);
-        let begun = Instant::now();
-        write(snapshot(solved, &[], output, Shown::Every(every as usize)))?;
-        Ok((all / every, begun.elapsed().as_secs_f64()))
-    };
-    // the first of all makes the folder
-    trial(FEW as f64)?;
-    let few = trial(FEW as f64)?;
-    let many = trial((SHARE * files * all).max(SHOWN as f64))?;
-    Ok(line_through(few, many, all))
-}
-
-/// The value at `x` of the line through two points of ascending abscissa, which neither falls nor begins below zero.
-fn line_through(few: (f64, f64), many: (f64, f64), x: f64) -> f64 {
-    let slope = ((many.1 - few.1) / (many.0 - few.0)).max(0.0);
-    if !slope.is_finite() {
-        return many.1;
-    }
-    (many.1 + slope * (x - many.0)).min(many.1 * x / many.0)
-}
-
-/// Seconds of all outputs of a scene at rest.
+/// Seconds of one VTU file of a run, none without VTU, and of the tables of a run at rest; files are written where the run would, with displacements that no compression finds easy.
 ///
 /// # Errors
 /// [`ObserveError`] if nothing can be written, as a run would.
 pub(crate) fn output_seconds<const D: usize>(
-    output: &Output<D>,
-    solved: &Solved<'_, D>,
-) -> Result<f64, ObserveError> {
-    let folder = TrialFolder::new(&output.directory);
-    let mut seconds = 0.0;
-    if output.vtu {
-        let path = folder.path().join("trial.vtu");
-        seconds += file_seconds(solved, output, 1.0, |s| {
-            write_vtu(&path, &s, Compression::default())
-        })?;
+    model: &Model<D>,
+    operator: &Operator<'_, D>,
+    rest: &RunSettings<D>,
+    moves: bool,
+) -> Result<[f64; 2], ObserveError> {
+    let made_up = |k: usize| 1e-3 * (1.7 * k as f64 + 0.3 * (k as f64).sqrt()).sin();
+    let u: Vec<f64> = (0..model.sites.len() * D).map(made_up).collect();
+    let solved = Solved {
+        model,
+        operator,
+        displacement: &u,
+        residual: if moves { &[] } else { &u },
+        zone_of_site: &zone_of_site(model),
+        system: None,
+        moved: Moved {
+            velocity: moves.then_some(&u),
+            ..Moved::default()
+        },
+        sections: &[],
+        stresses: (&rest.stresses, 0.0),
+    };
+    let mut file = 0.0;
+    if rest.output.vtu {
+        let every = (model.mesh.cell_count() + model.sites.len())
+            .div_ceil(SHOWN)
+            .max(1);
+        let begun = Instant::now();
+        let shown = snapshot(&solved, &[], &rest.output, Shown::Every(every));
+        write_vtu(
+            &rest.output.directory.join("trial.vtu"),
+            &shown,
+            Compression::default(),
+        )?;
+        file = every as f64 * begun.elapsed().as_secs_f64();
+    }
+    if moves {
+        return Ok([file, 0.0]);
     }
     let tables = Output {
-        directory: folder.path().to_path_buf(),
         vtu: false,
-        ..output.clone()
+        ..rest.output.clone()
     };
     let begun = Instant::now();
-    write(&tables, solved)?;
-    Ok(seconds + begun.elapsed().as_secs_f64())
+    write(&tables, &solved)?;
+    Ok([file, begun.elapsed().as_secs_f64()])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_file_costs_something_and_so_much_per_cell() {
-        // 2 ms, and 0.1 ms per cell
-        let t = |n: f64| (n, 2.0 + 0.1 * n);
-        assert!((line_through(t(10.0), t(100.0), 1000.0) - 102.0).abs() < 1e-12);
-        // a disturbed clock: not below what was measured, not above proportion
-        assert_eq!(line_through((10.0, 9.0), (100.0, 5.0), 1000.0), 5.0);
-        assert_eq!(line_through((50.0, 5.0), (50.0, 6.0), 50.0), 6.0);
-    }
 
     #[test]
     fn a_trial_folder_goes() {

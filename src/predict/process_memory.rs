@@ -1,7 +1,6 @@
 //! Memory of each of several processes: that of one process alone, less what others have of it, plus that of MPI and PETSc.
 
-use super::process_share::ProcessShare;
-use super::resource_estimate::Prediction;
+use super::resource_estimate::{Prediction, ProcessShare};
 use crate::model::Model;
 use crate::run::budget::{PER_BOND, PER_STATE_BOND};
 use crate::system::Symmetry;

@@ -1,11 +1,9 @@
 //! Share of a scene that each of several processes will have.
 
-use rustc_hash::FxHashSet;
-
 use super::process_memory::{Spreading, divide, per_bond};
-use super::process_share::ProcessShare;
-use super::resource_estimate::Prediction;
+use super::resource_estimate::{Prediction, ProcessShare};
 use crate::observe::summary::{bytes_text, grouped};
+use crate::parallel;
 use crate::progress::Progress;
 use crate::run::chosen::with_choice;
 use crate::run::equilibrium;
@@ -14,8 +12,7 @@ use crate::run::motion::{Sharing, may_share, may_share_rows, moves_own_sites};
 use crate::run::{AnyScene, RunError, setup};
 use crate::scene::{Scene, Solve};
 use crate::solve::statics::Method;
-use crate::system::{Partition, Ranks, SemiDiscrete, Symmetry, share_long_rows};
-use crate::{assembly::Pattern, parallel};
+use crate::system::{BlockCsr, Ranks, Symmetry, share_long_rows};
 use crate::{
     coupling::Coupling,
     model::{Distribution, Model},
@@ -89,56 +86,56 @@ fn shares<const D: usize>(
     let (model, coupling) = setup::model(problem, &rest, progress)?;
     let Distribution { partition, why } = model.distribute(count, is_shared, partitioner);
     let has_own_families = is_shared && model.can_spread_families();
-    let mut spreading = match is_static {
-        // forces that are not linear are solved for by every process, with all rows
-        true if rest.nonlinear(&model).is_none() => Spreading::Rows,
-        false if has_own_families => Spreading::Families,
-        _ => Spreading::Work,
-    };
-    let per_bond = f64::from(u8::from(has_own_families)) * per_bond(&model);
-    let moves_own = (explicit.as_ref()).is_some_and(|spec| moves_own_sites(spec, &rest));
-    if spreading == Spreading::Families && are_points(&model) && moves_own {
-        progress.finish();
-        let of_rank = |rank| of_points(&model, &partition, rank);
-        let shares = parallel::map(partition.ranks(), 1, of_rank);
-        return Ok(Processes {
-            shares,
-            distribution: why,
-            spreading,
-            per_bond,
-        });
-    }
     let operator = coupling.operator(&model)?;
-    let system = match moves_own {
-        true => {
-            let start = LayoutStart {
-                sharing: Sharing::Steps,
-                ..LayoutStart::default()
-            };
-            let (coupling, choices) = (coupling.as_ref(), &mut Vec::new());
-            let operator = &operator;
-            let moving = dynamic(&model, coupling, operator, &rest, start, choices, progress)?;
-            Some(moving.system)
-        }
-        false => None,
+    // forces that are not linear are solved for by every process, with all rows
+    let has_rows = is_static && rest.nonlinear(&model).is_none();
+    let rows = has_rows.then(|| model.assemble(&operator, progress));
+    let spreading = match &rows {
+        Some(rows) => of_statics(&model, coupling.as_ref(), rows, rest.solver.method),
+        None if has_own_families && !is_static => Spreading::Families,
+        None => Spreading::Work,
     };
-    let pattern = model.pattern(&operator, &[], progress);
-    if spreading == Spreading::Rows {
-        spreading = of_statics(&model, coupling.as_ref(), &pattern, rest.solver.method);
+    let moves_own = (explicit.as_ref()).is_some_and(|spec| moves_own_sites(spec, &rest));
+    let mut system = None;
+    if moves_own {
+        let start = LayoutStart {
+            sharing: Sharing::Steps,
+            ..LayoutStart::default()
+        };
+        let (coupling, told) = (coupling.as_ref(), &mut Vec::new());
+        system = Some(dynamic(&model, coupling, &operator, &rest, start, told, progress)?.system);
     }
+    let work = model.work_of_sites();
     let of_rank = |rank: usize| {
-        let system = system.as_deref();
-        let share = of_rows(&model, &partition, rank, (&pattern, system, is_static));
+        let sites = partition.of(rank);
+        let own = (0..model.sites.len() as u32).map(|site| partition.owner(site) == rank);
+        let own: Vec<bool> = own.collect();
+        let (reached, blocks) = match &rows {
+            Some(rows) => of_rows(rows, sites, &own),
+            None => {
+                let reached = system.as_ref().and_then(|s| s.sites_reached(&own));
+                let blocks = sites.iter().map(|&i| work[i as usize] as usize).sum();
+                // else forces are gathered
+                (reached.unwrap_or_else(|| vec![true; own.len()]), blocks)
+            }
+        };
+        let ghosts = reached.iter().filter(|is_reached| **is_reached).count() - sites.len();
+        let stored = match spreading {
+            Spreading::Work | Spreading::Families => 0,
+            Spreading::Products => sites.len() * 3usize.pow(D as u32),
+            Spreading::Factors | Spreading::Rows => blocks,
+        };
         ProcessShare {
+            sites: sites.len(),
+            ghosts,
+            blocks,
             bonds: match has_own_families {
-                true => bonds_held(&model, &own_points(&partition, rank)),
+                true => bonds_held(&model, &own),
                 false => model.bond_count(),
             },
-            stiffness_bytes: match spreading {
-                Spreading::Products => (share.sites * 3usize.pow(D as u32) * D * D) as u64 * SCALAR,
-                _ => share.stiffness_bytes,
-            },
-            ..share
+            stiffness_bytes: (stored * D * D) as u64 * SCALAR,
+            received_bytes: (ghosts * D * 8) as u64,
+            memory_bytes: 0,
         }
     };
     let shares = parallel::map(partition.ranks(), 1, of_rank);
@@ -147,30 +144,26 @@ fn shares<const D: usize>(
         shares,
         distribution: why,
         spreading,
-        per_bond,
+        per_bond: f64::from(u8::from(has_own_families)) * per_bond(&model),
     })
-}
-
-/// Returns true if every site is a point.
-fn are_points<const D: usize>(model: &Model<D>) -> bool {
-    (0..model.sites.len()).all(|site| model.point_of(site).is_some())
 }
 
 /// Distribution of a static scene with linear forces over processes: PETSc has its factors, products or rows.
 fn of_statics<const D: usize>(
     model: &Model<D>,
     coupling: &dyn Coupling<D>,
-    pattern: &Pattern,
+    rows: &BlockCsr,
     method: Method,
 ) -> Spreading {
-    let sites = model.sites.len();
-    let counts = [sites, pattern.stored, pattern.distinct].map(|n| n as f64);
-    let symmetry = equilibrium::symmetry(coupling, || pattern.asymmetry, &mut Vec::new());
+    let distinct = rows.values.len() / (D * D);
+    let counts = [rows.rows(), rows.columns.len(), distinct].map(|n| n as f64);
+    let symmetry = equilibrium::symmetry(coupling, || rows.asymmetry(), &mut Vec::new());
+    let are_points = || (0..model.sites.len()).all(|site| model.point_of(site).is_some());
     match method {
         Method::Direct => Spreading::Factors,
         _ if symmetry == Symmetry::Symmetric
             && model.is_lattice()
-            && are_points(model)
+            && are_points()
             && share_long_rows(D, counts) =>
         {
             Spreading::Products
@@ -179,79 +172,29 @@ fn of_statics<const D: usize>(
     }
 }
 
-/// Share of a process that has the rows of its own sites; `system` is the one that moves by them, if there is one.
-fn of_rows<const D: usize>(
-    model: &Model<D>,
-    partition: &Partition,
-    rank: usize,
-    (pattern, system, is_static): (&Pattern, Option<&dyn SemiDiscrete>, bool),
-) -> ProcessShare {
-    let own = partition.of(rank);
-    let row = |site: &u32| {
-        let site = *site as usize;
-        &pattern.columns[pattern.row_offsets[site]..pattern.row_offsets[site + 1]]
-    };
-    let blocks: usize = own.iter().map(|site| row(site).len()).sum();
-    let reached = system.and_then(|system| system.sites_reached(&own_points(partition, rank)));
-    let ghosts = match &reached {
-        Some(reached) => reached.iter().filter(|is_reached| **is_reached).count() - own.len(),
-        None => {
-            let columns = own.iter().flat_map(row).copied();
-            let foreign = columns.filter(|site| partition.owner(*site) != rank);
-            foreign.collect::<FxHashSet<u32>>().len()
+/// Own sites and all that their rows see, and the number of blocks of these rows that are not zero.
+fn of_rows(rows: &BlockCsr, sites: &[u32], own: &[bool]) -> (Vec<bool>, usize) {
+    let (mut reached, mut blocks) = (own.to_vec(), 0);
+    for &site in sites {
+        let (columns, values) = rows.row(site as usize);
+        for (&column, block) in columns.iter().zip(values.chunks(rows.block.pow(2))) {
+            if block.iter().any(|&k| k != 0.0) {
+                reached[column as usize] = true;
+                blocks += 1;
+            }
         }
-    };
-    let numbers = match is_static || reached.is_some() {
-        true => ghosts,
-        // forces are gathered
-        false => model.sites.len() - own.len(),
-    };
-    ProcessShare {
-        sites: own.len(),
-        ghosts,
-        blocks,
-        bonds: 0,
-        stiffness_bytes: match is_static {
-            true => (blocks * D * D) as u64 * SCALAR,
-            false => 0,
-        },
-        received_bytes: (numbers * D * 8) as u64,
-        memory_bytes: 0,
     }
+    (reached, blocks)
 }
 
-fn own_points(partition: &Partition, rank: usize) -> Vec<bool> {
-    let sites = 0..partition.sites() as u32;
-    sites.map(|site| partition.owner(site) == rank).collect()
-}
-
-fn bonds_of<const D: usize>(model: &Model<D>, point: usize) -> usize {
-    model.body().map_or(0, |b| b.families.of(point).len())
-}
-
-/// Bonds of the families that a process with these points holds where families are spread over processes.
+/// Bonds of the families that a process with these sites holds where families are spread over processes.
 fn bonds_held<const D: usize>(model: &Model<D>, own: &[bool]) -> usize {
-    let held = model.points_held(own);
-    let held = (0..held.len()).filter(|&i| held[i]);
-    held.map(|i| bonds_of(model, i)).sum()
-}
-
-/// The same where each process moves its own points, and knows those of others whose displacements their forces take.
-fn of_points<const D: usize>(model: &Model<D>, partition: &Partition, rank: usize) -> ProcessShare {
-    let own = own_points(partition, rank);
-    let reached = model.points_reached(&own).into_iter().zip(&own);
-    let ghosts = reached.filter(|(is_reached, is_own)| *is_reached && !**is_own);
-    let ghosts = ghosts.count();
-    let sites = partition.of(rank);
-    ProcessShare {
-        sites: sites.len(),
-        ghosts,
-        blocks: sites.iter().map(|&i| bonds_of(model, i as usize)).sum(),
-        bonds: bonds_held(model, &own),
-        stiffness_bytes: 0,
-        received_bytes: (ghosts * D * 8) as u64,
-        memory_bytes: 0,
-    }
+    let held = model.points_held(own).into_iter().enumerate();
+    let of = |(i, is_held): (usize, bool)| match (is_held, model.body()) {
+        (true, Some(body)) => body.families.of(i).len(),
+        _ => 0,
+    };
+    held.map(of).sum()
 }
 
 /// The least, the mean and the most of what processes have, as a table.

@@ -1,17 +1,16 @@
 //! Prediction of the resources of a run: sites, bonds, non-zeros, memory and time, without solving the scene.
 //!
-//! The model is laid out as a run does it, so sites and bonds are exact, and what it occupies is read from the system.
-//! Each row of the stiffness is computed and dropped at once; only its pattern stays, from which ordering and symbolic
-//! factorisation follow. That costs the time of an assembly and a tenth of its memory, and no factorisation.
+//! The model is laid out, assembled and proved as a run does it, so sizes are exact and what it occupies is read from the system;
+//! ordering and symbolic factorisation follow from the stiffness. That costs what a run takes before it solves, and no factorisation.
 
 use serde::Serialize;
 
 use super::error_prediction::ErrorPrediction;
-use super::output_cost::{made_up, output_seconds};
-use super::solver_estimate::{PROGRAM, Planned};
-use crate::assembly::Pattern;
+use super::output_cost::{TrialFolder, output_bytes, output_seconds};
+use super::solver_estimate::Planned;
 use crate::mesh::Mesh;
 use crate::model::zone_distance::Edge;
+use crate::model::{Model, PointSource, Zone};
 use crate::observe::proof::{Proof, Severity};
 use crate::observe::summary::{
     Decision, Sizes, Stopwatch, Timings, bytes_text, grouped, peak_memory_bytes,
@@ -23,26 +22,20 @@ use crate::peridynamics::{
 use crate::progress::Progress;
 use crate::run::RunError;
 use crate::run::budget::{Share, largest, memory_budget};
-use crate::run::equilibrium;
+use crate::run::condition_terms::ConditionTerms;
+use crate::run::equilibrium::{self, Assembled};
 use crate::run::loads;
-use crate::run::proof::{self, Subject};
 use crate::run::setup::{self, RunSettings};
-use crate::run::solution::{self, Moved, Solved};
+use crate::run::statics::StaticBody;
 use crate::run::warnings::{doubts, of_elements, unusual_stretch};
 use crate::scene::Scene;
 use crate::scene::spec::{CouplingTraits, ZonesNeeded};
 use crate::solve::FreeDofs;
 use crate::solve::statics::MethodUsed;
 use crate::system::Symmetry;
-use crate::{
-    coupling::{Coupling, Operator},
-    model::{Model, PointSource, SiteKind, Zone},
-};
-
-use super::process_share::ProcessShare;
 
 /// Predicted resources of a run.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Prediction {
     /// The scene's name or title.
     pub scene: String,
@@ -116,231 +109,129 @@ pub struct MotionPrediction {
     pub seconds_per_step: f64,
 }
 
+/// Share of one of several processes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ProcessShare {
+    /// Sites whose rows it computes.
+    pub sites: usize,
+    /// Sites of other processes whose displacements these rows need, or the forces of these sites where each process moves its own; all where forces are gathered.
+    pub ghosts: usize,
+    /// Blocks of these rows: bonds, and pairs of nodes of an element; of a scene in time about.
+    pub blocks: usize,
+    /// Bonds whose families it holds: those of all points, or of its own, and of these points' neighbours where a law asks for them.
+    pub bonds: usize,
+    /// Memory of its part of the stiffness in PETSc \[bytes\], or of the springs that precondition it where rows are shared, without factors or coarse levels; zero of a scene in time or with forces that are not linear.
+    pub stiffness_bytes: u64,
+    /// Data received for each product with the stiffness, or for each step in time \[bytes\]: the numbers of its ghosts.
+    pub received_bytes: u64,
+    /// Most memory that it will hold \[bytes\].
+    pub memory_bytes: u64,
+}
+
+/// Bytes of program and buffers that a run touches after its model is laid out; measured.
+const PROGRAM: u64 = 3_700_000;
+
 /// Predicts a static run.
 ///
 /// # Errors
 /// [`RunError`] if the model cannot be built or a condition meets no site, as a run would.
 pub(crate) fn predict<const D: usize>(
-    scene: Scene<D>,
+    mut scene: Scene<D>,
     progress: &dyn Progress,
 ) -> Result<Prediction, RunError> {
+    let folder = TrialFolder::new(&scene.output.directory);
+    scene.output.directory = folder.path().to_path_buf();
     let (mut timings, mut watch) = (Timings::default(), Stopwatch::start());
-    let title = scene.title.clone();
-    let traits = scene.coupling.traits();
-    let (cells, nodes) = (scene.mesh.cell_count(), scene.mesh.nodes.len());
+    let (title, traits) = (scene.title.clone(), scene.coupling.traits());
+    let counts = [scene.mesh.nodes.len(), scene.mesh.cell_count()];
     let (problem, rest) = setup::problem(scene);
     let (model, coupling) = setup::model(problem, &rest, progress)?;
     let operator = coupling.operator(&model)?;
     watch.lap(&mut timings, "sites and bonds");
     let laid_out = resident_memory_bytes().unwrap_or(0);
     let layout_peak = peak_memory_bytes().unwrap_or(0);
-    let pattern = affine_pattern(&model, &operator, progress);
+    let terms = ConditionTerms::new(&model, &rest.conditions)?;
+    let mut stiffness = model.assemble(&operator, progress);
     watch.lap(&mut timings, "assembly");
+    let body = StaticBody {
+        model: &model,
+        coupling: coupling.as_ref(),
+        operator: &operator,
+        rest: &rest,
+        ranks: None,
+        has_exact_seam: false,
+    };
     loads::loads(&model, &rest.conditions, 0.0)?;
-    let free = free_dofs(&model, &rest)?;
-    let proof = proved(
-        &model,
-        coupling.as_ref(),
-        &operator,
-        &rest,
-        &pattern,
-        progress,
-    )?;
+    let (prescribed, _) = loads::supports(&model, &rest.conditions, 0.0)?;
+    let (proof, _) = body.prove(&Assembled::Whole(&stiffness), progress)?;
     watch.lap(&mut timings, "proof");
     let mut choices: Vec<_> = rest.choices.iter().chain(&rest.placed).cloned().collect();
     choices.push(rest.coupling(traits));
-    let symmetry = equilibrium::symmetry(coupling.as_ref(), || pattern.asymmetry, &mut choices);
-    let nonzeros = pattern.stored * D * D;
-    let plan = Planned::of(&model, &pattern, &free, &rest, symmetry)?;
+    let symmetry = equilibrium::symmetry(coupling.as_ref(), || stiffness.asymmetry(), &mut choices);
+    terms.rows.add_to(&mut stiffness);
+    let free = FreeDofs::from_prescribed(&prescribed, D);
+    let plan = Planned::of(&model, &stiffness, &free, &rest, symmetry)?;
     watch.lap(&mut timings, "conditions and ordering");
     progress.finish();
-
-    let sizes = sizes_of(&model, &operator, [nodes, cells], nonzeros);
-    choices.extend(solver_decisions(
-        &model,
-        &rest,
-        plan.method,
-        symmetry,
-        free.count(),
-    ));
-    choices.extend(weights_decisions(&model));
-
-    let (memory, peak) = plan.memory(laid_out, &sizes, &rest.output);
-    plan.add_seconds(symmetry, nonzeros, &mut timings);
-    timings.add("output", seconds_of_output(&model, &operator, &rest)?);
+    // led by the factors of the stiffness, where these are worth their cost
+    let nonlinear = rest.nonlinear(&model);
+    let method = nonlinear.map_or(plan.method, |_| MethodUsed::Newton);
+    choices.extend(body.decisions(method, symmetry, free.count()));
+    choices.extend(weights_decision(&model));
+    let sizes = body.sizes(counts, stiffness.nonzeros());
+    plan.add_seconds(&mut timings);
+    let output = output_seconds(&model, &operator, &rest, false)?;
+    timings.add("output", output.iter().sum());
+    let output = output_bytes(&sizes, &rest.output);
+    let base_bytes = laid_out + PROGRAM;
+    let peak = base_bytes + plan.stiffness + plan.solver.max(output);
+    let items = [
+        ("model", laid_out),
+        ("program", PROGRAM),
+        ("stiffness", plan.stiffness),
+        ("solver", plan.solver),
+        ("output", output),
+    ];
     let mut prediction = Prediction {
         scene: title,
-        counted: None,
         dimension: D,
         coupling: traits.name.to_owned(),
         sizes,
         method: Some(plan.method),
         symmetry,
         unknowns: free.count(),
-        factor_nonzeros: plan.factor_nonzeros(),
-        operations: plan.operations(),
+        factor_nonzeros: plan.cost.factor_nnz,
+        operations: plan.cost.flops,
         peak_memory_bytes: peak.max(layout_peak),
-        memory,
-        base_bytes: laid_out + PROGRAM,
+        memory: items.map(|(name, bytes)| Share::new(name, bytes)).to_vec(),
+        base_bytes,
         total_seconds: timings.total(),
         timings,
         choices,
         proof,
-        warnings: Vec::new(),
-        error: None,
-        no_error: None,
-        motion: None,
-        processes: Vec::new(),
-        distribution: String::new(),
+        ..Prediction::default()
     };
     prediction.warnings = warnings(&model, &rest, traits, &prediction)?;
     holds(&prediction)?;
     Ok(prediction)
 }
 
-/// Sizes of a model that is laid out, of a mesh of so many nodes and cells.
-fn sizes_of<const D: usize>(
-    model: &Model<D>,
-    operator: &Operator<'_, D>,
-    [nodes, cells]: [usize; 2],
-    nonzeros: usize,
-) -> Sizes {
-    let points = model
-        .sites
-        .iter()
-        .filter(|s| matches!(s.kind, SiteKind::Point(_)))
-        .count();
-    Sizes {
-        nodes,
-        cells,
-        sites: model.sites.len(),
-        points,
-        bonds: model.body().map_or(0, |b| b.bond_count()) + operator.additional_bonds(),
-        dofs: model.sites.len() * D,
-        nonzeros,
-    }
-}
-
-/// Decisions on bond weights and volumes of points.
-fn weights_decisions<const D: usize>(model: &Model<D>) -> Vec<Decision> {
-    let mut choices = Vec::new();
-    if let Some(p) = &model.peridynamics {
-        choices.push(Decision {
-            choice: format!("{:?} bond weights", p.weights),
-            why: match p.weights {
-                BondWeights::Plain => {
-                    "the papers' quadrature; its elastic tensor is not isotropic".to_owned()
-                }
-                BondWeights::Isotropic if model.is_lattice() => {
-                    "the lattice carries the typed elastic constants".to_owned()
-                }
-                BondWeights::Isotropic => scattered(model),
-                BondWeights::Fitted => "each family carries the typed elastic constants".to_owned(),
-            },
-        });
-        choices.extend(setup::model_choices(model));
-    }
-    choices
-}
-
-/// Seconds of the output, from a sample of it that is written.
-///
-/// # Errors
-/// [`RunError`] if it cannot be written.
-fn seconds_of_output<const D: usize>(
-    model: &Model<D>,
-    operator: &Operator<'_, D>,
-    rest: &RunSettings<D>,
-) -> Result<f64, RunError> {
-    let zones = solution::zone_of_site(model);
-    let displacement = made_up(model.sites.len() * D);
-    let made_up = Solved {
-        model,
-        operator,
-        displacement: &displacement,
-        residual: &displacement,
-        zone_of_site: &zones,
-        system: None,
-        moved: Moved::default(),
-        sections: &[],
-        stresses: (&rest.stresses, 0.0),
-    };
-    Ok(output_seconds(&rest.output, &made_up)?)
-}
-
-/// Returns the proof of a model by its rows on affine fields.
-///
-/// # Errors
-/// [`RunError::Unproven`] for a proof that refuses the model.
-fn proved<const D: usize>(
-    model: &Model<D>,
-    coupling: &dyn Coupling<D>,
-    operator: &Operator<'_, D>,
-    rest: &RunSettings<D>,
-    pattern: &Pattern,
-    progress: &dyn Progress,
-) -> Result<Proof, RunError> {
-    let proof = proof::prove(
-        &Subject {
-            model,
-            coupling,
-            operator,
-            rest,
-            stiffness: None,
-            product: None,
-            system: None,
-            affine_forces: &pattern.products,
-            ranks: None,
+/// The decision on bond weights; none of a model without bonds.
+fn weights_decision<const D: usize>(model: &Model<D>) -> Option<Decision> {
+    let weights = model.peridynamics.as_ref()?.weights;
+    Some(Decision {
+        choice: format!("{weights:?} bond weights"),
+        why: match weights {
+            BondWeights::Plain => {
+                "the papers' quadrature; its elastic tensor is not isotropic".to_owned()
+            }
+            BondWeights::Isotropic if model.is_lattice() => {
+                "the lattice carries the typed elastic constants".to_owned()
+            }
+            BondWeights::Isotropic => scattered(model),
+            BondWeights::Fitted => "each family carries the typed elastic constants".to_owned(),
         },
-        progress,
-    )?;
-    proof::hold(&proof)?;
-    Ok(proof)
-}
-
-/// The pattern of the stiffness, with the forces of affine fields.
-fn affine_pattern<const D: usize>(
-    model: &Model<D>,
-    operator: &Operator<'_, D>,
-    progress: &dyn Progress,
-) -> Pattern {
-    let fields = proof::affine_displacements(model);
-    model.pattern(operator, &fields, progress)
-}
-
-/// Unknowns that no condition prescribes.
-///
-/// # Errors
-/// [`RunError`] for a condition that meets no site.
-fn free_dofs<const D: usize>(
-    model: &Model<D>,
-    rest: &RunSettings<D>,
-) -> Result<FreeDofs, RunError> {
-    let (prescribed, _) = loads::supports(model, &rest.conditions, 0.0)?;
-    Ok(FreeDofs::from_prescribed(&prescribed, D))
-}
-
-/// Decisions on the solver, with the reason why the system is not linear where it is not.
-fn solver_decisions<const D: usize>(
-    model: &Model<D>,
-    rest: &RunSettings<D>,
-    method: MethodUsed,
-    symmetry: Symmetry,
-    unknowns: usize,
-) -> Vec<Decision> {
-    let mut choices = Vec::new();
-    let nonlinear = rest.nonlinear(model);
-    // led by the factors of the stiffness, where these are worth their cost
-    let solver_name = match nonlinear {
-        None => method.name(),
-        Some(_) => MethodUsed::Newton.name(),
-    };
-    choices.extend(nonlinear);
-    choices.push(Decision {
-        choice: solver_name.to_owned(),
-        why: format!("{} system of {} unknowns", symmetry.name(), unknowns),
-    });
-    choices
+    })
 }
 
 /// Bonds beyond which a scene deserves a second thought.

@@ -10,7 +10,6 @@ use crate::mesh::Mesh;
 use crate::model::{CellRole, Reach, Zone};
 use crate::observe::report::number;
 use crate::observe::summary::{bytes_text, grouped, resident_memory_bytes};
-use crate::peridynamics::TIE_TOLERANCE;
 use crate::run::error::RunError;
 use crate::scene::Peridynamics;
 use crate::scene::points::Points;
@@ -26,6 +25,13 @@ pub struct Share {
     pub name: &'static str,
     /// Bytes.
     pub bytes: u64,
+}
+
+impl Share {
+    /// The bytes of an item.
+    pub(crate) fn new(name: &'static str, bytes: u64) -> Self {
+        Self { name, bytes }
+    }
 }
 
 /// Bytes that [`set_memory_budget`] has set; no limit of its own while zero.
@@ -76,7 +82,7 @@ fn control_group() -> Option<u64> {
 
 /// Sizes of a scene, counted from volumes.
 ///
-/// Points within a hundredth where cells are larger than the spacing; bonds are those of whole families, so that near surfaces fewer exist.
+/// Points within a hundredth where cells are larger than the spacing; bonds within a tenth of those of whole families, and near surfaces fewer exist.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Counts {
     /// Nodes of the mesh.
@@ -166,7 +172,7 @@ impl Counts {
         let nodes = (mesh.nodes.len() as f64 * elements / mesh.cell_count().max(1) as f64).ceil();
         counts.dofs = (nodes + counts.points) * D as f64;
         let row = if counts.is_state_based {
-            family_size::<D>(2.0 * radius::<D>(mean))
+            mean * f64::from(1 << D)
         } else {
             mean
         };
@@ -212,10 +218,7 @@ impl Counts {
 
     /// The memory that the counts ask for; what of it is held at the same time, [`Counts::peak`] sums.
     pub fn memory(&self) -> Vec<Share> {
-        let share = |name, bytes: f64| Share {
-            name,
-            bytes: bytes as u64,
-        };
+        let share = |name, bytes: f64| Share::new(name, bytes as u64);
         let state = f64::from(u8::from(self.is_state_based));
         let mut list = vec![
             share(
@@ -281,45 +284,10 @@ const PER_NONZERO: f64 = 2.0;
 /// Bytes of the factors, or of the multigrid hierarchy, per scalar of the stiffness.
 const SOLVER: f64 = 12.0;
 
-/// Points of a lattice within `radius` spacings of one of them, without itself.
+/// Points within `radius` spacings, by the volume of the ball: within a tenth of those of a lattice from two spacings on.
 fn family_size<const D: usize>(radius: f64) -> f64 {
-    let r = radius * (1.0 + TIE_TOLERANCE);
-    if r.is_nan() || r < 1.0 {
-        return 0.0;
-    }
-    let ball = match D {
-        1 => return 2.0 * r.floor(),
-        2 => std::f64::consts::PI * r * r,
-        _ => 4.0 / 3.0 * std::f64::consts::PI * r.powi(3),
-    };
-    // far beyond what is in use the volume is as good
-    if r > 64.0 {
-        return ball;
-    }
-    let chord = |rest: f64| 2.0 * rest.max(0.0).sqrt().floor() + 1.0;
-    let most = r.floor() as i64;
-    let line = |rest: f64| -> f64 {
-        (-most..=most)
-            .map(|j| rest - (j * j) as f64)
-            .filter(|rest| *rest >= 0.0)
-            .map(chord)
-            .sum()
-    };
-    let inside: f64 = match D {
-        2 => line(r * r),
-        _ => (-most..=most).map(|k| line(r * r - (k * k) as f64)).sum(),
-    };
-    inside - 1.0
-}
-
-/// The radius, in spacings, of a family of so many points.
-fn radius<const D: usize>(family: f64) -> f64 {
     let pi = std::f64::consts::PI;
-    match D {
-        1 => family / 2.0,
-        2 => (family / pi).sqrt(),
-        _ => (0.75 * family / pi).cbrt(),
-    }
+    radius.powi(D as i32) * [2.0, pi, 4.0 / 3.0 * pi][D - 1]
 }
 
 /// Points within `margin` of the cells that hold points, outside of them, and the places of the lattice in the box around both.
@@ -449,8 +417,8 @@ fn remedy<const D: usize>(scene: &Scene<D>, counts: &Counts, there: u64) -> Stri
 const SEARCH: f64 = 4e-7;
 /// The same per bond of a body that moves: its traversals, and the stable step from its rows.
 const SET_UP: f64 = 2.5e-6;
-/// The same per scalar of the stiffness: computed, dropped, ordered.
-const PATTERN: f64 = 1.8e-7;
+/// The same per scalar of the stiffness: assembled, ordered.
+const ASSEMBLY: f64 = 1.8e-7;
 /// The same per scalar of an iterative solve.
 const SOLVE: f64 = 2.4e-7;
 /// The same per bond and step.
@@ -462,7 +430,7 @@ impl Counts {
         let threads = rayon::current_num_threads() as f64;
         let (lay_out, run) = match &scene.solve {
             Solve::Static => (
-                SEARCH * self.searched + PATTERN * self.nonzeros,
+                SEARCH * self.searched + ASSEMBLY * self.nonzeros,
                 SOLVE * self.nonzeros,
             ),
             Solve::Explicit(solve) => {

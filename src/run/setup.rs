@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::material::LocalLaw;
 use crate::observe::checkpoint::Fingerprint;
-use crate::observe::summary::Decision;
+use crate::observe::summary::{Decision, Sizes};
 use crate::peridynamics::bond_force::BondKinematics;
 use crate::peridynamics::{BondWeights, PartialVolume};
 use crate::progress::Progress;
@@ -23,7 +23,7 @@ use crate::scene::validated::{Output, Scene, Solver};
 use crate::system::Ranks;
 use crate::tensor::padded;
 use crate::{
-    coupling::{Coupling, Problem},
+    coupling::{Coupling, Operator, Problem},
     model::{self, ElasticCells, HorizonField, Model, PointSource, Surfaces, ZonedBody},
 };
 
@@ -274,6 +274,21 @@ pub(crate) fn shared_model<const D: usize>(
         model.follow_bonds(rest.kinematics())?;
     }
     Ok((model, coupling))
+}
+
+/// Sizes of a model; it has no stiffness.
+pub fn sizes<const D: usize>(model: &Model<D>, operator: &Operator<'_, D>) -> Sizes {
+    Sizes {
+        nodes: model.mesh.nodes.len(),
+        cells: model.mesh.cell_count(),
+        sites: model.sites.len(),
+        points: (0..model.sites.len())
+            .filter(|&site| model.point_of(site).is_some())
+            .count(),
+        bonds: model.bond_count() + operator.additional_bonds(),
+        dofs: model.sites.len() * D,
+        nonzeros: 0,
+    }
 }
 
 /// Properties of a model worth knowing before it is solved: partial volumes, points on a border of materials, sizes of elements beside the points.

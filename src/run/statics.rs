@@ -6,7 +6,7 @@ use super::motion::{self, RunOptions};
 use super::proof::{self, Subject};
 use super::rotation::Rotations;
 use super::sections::Sections;
-use super::setup::{RunSettings, model_choices, problem, same_everywhere, shared_model};
+use super::setup::{RunSettings, model_choices, problem, same_everywhere, shared_model, sizes};
 use super::solution::{Moved, Solved, zone_of_site};
 use super::zone_placement::{CachedSolution, difference_from_elements};
 use crate::run::placed_scene::PlacedScene;
@@ -30,12 +30,13 @@ use crate::run::surface_gradient::{Asked, steep_stresses};
 use crate::run::warnings::{Imbalance, indefinite, of_elements, out_of_balance, warnings};
 use crate::scene::spec::{CouplingTraits, ElementsSpec};
 use crate::scene::validated::{Output, Scene};
-use crate::solve::statics::StaticInfo;
-use crate::system::{Ranks, SemiDiscrete};
+use crate::solve::krylov::LinearMap;
+use crate::solve::statics::MethodUsed;
+use crate::system::{Ranks, SemiDiscrete, Symmetry};
 use crate::tensor::Vector;
 use crate::{
     coupling::{Coupling, Operator, Problem},
-    model::{Model, SiteKind},
+    model::Model,
 };
 
 /// Solves a static scene and writes its outputs.
@@ -154,7 +155,7 @@ fn solve_chosen<const D: usize>(
         }
     };
     watch = Stopwatch::start();
-    choices.extend(body.decisions(equilibrium));
+    choices.extend(body.told(equilibrium));
     let residual = equilibrium.residual();
     let sections = body.section_forces(&residual, &equilibrium.solution.displacement)?;
     let solved = Solved {
@@ -173,7 +174,7 @@ fn solve_chosen<const D: usize>(
     progress.finish();
     Ok(RunSummary {
         scene: name,
-        sizes: body.sizes(counts, &equilibrium.solution.info),
+        sizes: body.sizes(counts, equilibrium.solution.info.matrix_nnz),
         choices,
         total_seconds: timings.total(),
         timings,
@@ -199,14 +200,14 @@ fn laid_out<const D: usize>(
 }
 
 /// A model with its rows and conditions, about to be solved.
-struct StaticBody<'a, const D: usize> {
-    model: &'a Model<D>,
-    coupling: &'a dyn Coupling<D>,
-    operator: &'a Operator<'a, D>,
-    rest: &'a RunSettings<D>,
-    ranks: Option<&'a dyn Ranks>,
+pub(crate) struct StaticBody<'a, const D: usize> {
+    pub model: &'a Model<D>,
+    pub coupling: &'a dyn Coupling<D>,
+    pub operator: &'a Operator<'a, D>,
+    pub rest: &'a RunSettings<D>,
+    pub ranks: Option<&'a dyn Ranks>,
     /// True if bonds of the seam are geometrically exact like others.
-    has_exact_seam: bool,
+    pub has_exact_seam: bool,
 }
 
 impl<const D: usize> StaticBody<'_, D> {
@@ -214,7 +215,7 @@ impl<const D: usize> StaticBody<'_, D> {
     ///
     /// # Errors
     /// [`RunError::Unproven`] for a proof that refuses the model.
-    fn prove(
+    pub fn prove(
         &self,
         assembled: &Assembled<'_>,
         progress: &dyn Progress,
@@ -231,12 +232,11 @@ impl<const D: usize> StaticBody<'_, D> {
                     Assembled::Whole(stiffness) => Some(stiffness),
                     Assembled::Spread(_) => None,
                 },
-                product: match assembled {
-                    Assembled::Whole(_) => None,
-                    Assembled::Spread(rows) => Some(*rows),
+                product: &|u, force| match assembled {
+                    Assembled::Whole(stiffness) => stiffness.multiply_into(u, force),
+                    Assembled::Spread(rows) => rows.apply_into(u, force),
                 },
                 system: None,
-                affine_forces: &[],
                 ranks: self.ranks,
             },
             progress,
@@ -295,18 +295,24 @@ impl<const D: usize> StaticBody<'_, D> {
         Ok((solved, proof))
     }
 
-    /// Decisions made for the solution.
-    fn decisions(&self, equilibrium: &Equilibrium) -> Vec<Decision> {
+    /// Decisions made up to an equilibrium, and the properties of the model.
+    fn told(&self, equilibrium: &Equilibrium) -> Vec<Decision> {
         let info = &equilibrium.solution.info;
-        let mut choices = equilibrium.choices.clone();
-        choices.extend(self.rest.nonlinear(self.model));
+        let made = self.decisions(info.method, equilibrium.symmetry, info.free_dofs);
+        equilibrium.choices.iter().cloned().chain(made).collect()
+    }
+
+    /// Decisions made for the solution, and the properties of the model.
+    pub fn decisions(
+        &self,
+        method: MethodUsed,
+        symmetry: Symmetry,
+        unknowns: usize,
+    ) -> Vec<Decision> {
+        let mut choices: Vec<_> = self.rest.nonlinear(self.model).into_iter().collect();
         choices.push(Decision {
-            choice: info.method.name().to_owned(),
-            why: format!(
-                "{} system of {} unknowns",
-                equilibrium.symmetry.name(),
-                info.free_dofs
-            ),
+            choice: method.name().to_owned(),
+            why: format!("{} system of {unknowns} unknowns", symmetry.name()),
         });
         choices.extend(model_choices(self.model));
         choices
@@ -410,21 +416,13 @@ impl<const D: usize> StaticBody<'_, D> {
         Ok(sections.forces(residual, u, 0.0))
     }
 
-    /// Sizes of a model with so many nodes and cells.
-    fn sizes(&self, [nodes, cells]: [usize; 2], info: &StaticInfo) -> Sizes {
-        let model = self.model;
+    /// Sizes of a model whose mesh has so many nodes and cells.
+    pub fn sizes(&self, [nodes, cells]: [usize; 2], nonzeros: usize) -> Sizes {
         Sizes {
             nodes,
             cells,
-            sites: model.sites.len(),
-            points: model
-                .sites
-                .iter()
-                .filter(|s| matches!(s.kind, SiteKind::Point(_)))
-                .count(),
-            bonds: model.bond_count() + self.operator.additional_bonds(),
-            dofs: model.sites.len() * D,
-            nonzeros: info.matrix_nnz,
+            nonzeros,
+            ..sizes(self.model, self.operator)
         }
     }
 

@@ -16,13 +16,13 @@ use crate::observe::checkpoint::{CheckpointError, CheckpointFile};
 use crate::observe::cracks::CrackSummary;
 use crate::observe::proof::{Part, Proof};
 use crate::observe::summary::{
-    Decision, Ended, EnergyGain, MotionSummary, Rotation, RunSummary, Sizes, Stopwatch, Timings,
+    Decision, Ended, EnergyGain, MotionSummary, Rotation, RunSummary, Stopwatch, Timings,
     peak_memory_bytes,
 };
 use crate::progress::Progress;
 use crate::run::error::{RunError, explained};
 use crate::run::loads;
-use crate::run::setup::RunSettings;
+use crate::run::setup::{RunSettings, sizes};
 use crate::run::warnings::{of_elements, unusual_stretch, warnings, without_response};
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::CouplingTraits;
@@ -30,26 +30,9 @@ use crate::scene::validated::Scene;
 use crate::solve::explicit::{Explicit, ExplicitParams, State};
 use crate::system::SemiDiscrete;
 use crate::{
-    coupling::{BrokenBonds, Operator},
-    model::{Model, SiteKind, Zone},
+    coupling::BrokenBonds,
+    model::{Model, Zone},
 };
-
-/// The sizes of a model that moves.
-pub fn sizes<const D: usize>(model: &Model<D>, operator: &Operator<'_, D>) -> Sizes {
-    Sizes {
-        nodes: model.mesh.nodes.len(),
-        cells: model.mesh.cell_count(),
-        sites: model.sites.len(),
-        points: model
-            .sites
-            .iter()
-            .filter(|s| matches!(s.kind, SiteKind::Point(_)))
-            .count(),
-        bonds: model.bond_count() + operator.additional_bonds(),
-        dofs: model.sites.len() * D,
-        nonzeros: 0,
-    }
-}
 
 /// Start of a segment of a run, which has one layout of the zones.
 enum From<'a, const D: usize> {

@@ -228,11 +228,6 @@ impl<'a, const D: usize> Recorder<'a, D> {
         self.energy_at_start = moment.kinetic + system.stored_energy(&state.u) + dissipated;
     }
 
-    /// As many zeros as there are columns of stresses at probes: for trials of the output.
-    pub fn unprobed(&self) -> Vec<f64> {
-        vec![0.0; field_probes::header(self.output).len()]
-    }
-
     fn dissipated(&self, system: &dyn SemiDiscrete) -> f64 {
         match self.breaks {
             Breaks::Possibly | Breaks::Gradually | Breaks::Dissipating => {

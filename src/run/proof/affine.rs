@@ -41,13 +41,6 @@ struct Subject<'a, const D: usize> {
     spread: Option<Spread<'a>>,
 }
 
-/// The displacement of all sites under each affine field.
-pub fn displacements<const D: usize>(model: &Model<D>) -> Vec<Vec<f64>> {
-    let (tensor, centre) = (reference(model), centre(model));
-    let fields = gradients(&tensor).into_iter();
-    fields.map(|g| affine(model, &g, &centre)).collect()
-}
-
 /// The tensor that fields are scaled by: that of the points, or of the first cell.
 fn reference<const D: usize>(model: &Model<D>) -> Tensor4<D> {
     let own = model.peridynamic_material();
@@ -95,37 +88,14 @@ pub(super) fn part<const D: usize>(
         (Some(_), PrecisionSpec::Single) => limits::EXACT.max(100.0 * f64::from(f32::EPSILON)),
         _ => limits::EXACT,
     };
-    let sites = model.sites.len();
-    let apply = |number: usize, u: &[f64], force: &mut Vec<f64>| match (
-        proved.affine_forces.get(number),
-        proved.stiffness,
-        proved.product,
-        proved.system,
-    ) {
-        (Some(known), ..) => force.clone_from(known),
-        (None, Some(stiffness), ..) => stiffness.multiply_into(u, force),
-        (None, None, Some(product), _) => product.apply_into(u, force),
-        (None, None, None, Some(system)) => system.tangent_into(u, force),
-        (None, None, None, None) => {
-            let rows = |s: usize, row: &mut Row<D>| {
-                model.add_scaled_row(subject.operator, s, row);
-                row.take_products([u])[0]
-            };
-            let new = || Row::<D>::new(sites);
-            let products = parallel::map_with(sites, 1, new, |row, s| rows(s, row));
-            force.clear();
-            products.iter().for_each(|f| force.extend(f.iter()));
-        }
-    };
-    let proof = prove(&subject, exact, apply);
-    Ok(Some(proof))
+    Ok(Some(prove(&subject, exact, proved.product)))
 }
 
-/// Compares the rows with the nodal forces of the fields; `apply` overwrites its last argument with the internal force under the field of that number.
+/// Compares the rows with the nodal forces of the fields; `apply` overwrites its last argument with the internal force under a field.
 fn prove<const D: usize>(
     subject: &Subject<'_, D>,
     exact: f64,
-    apply: impl Fn(usize, &[f64], &mut Vec<f64>),
+    apply: impl Fn(&[f64], &mut [f64]),
 ) -> Part {
     let model = subject.model;
     let (tensor, centre) = (reference(model), centre(model));
@@ -144,9 +114,9 @@ fn prove<const D: usize>(
     // stiffer materials make larger forces of the same field
     let largest = (0..model.mesh.cell_count()).map(|c| model.tensor_of_cell(c).amax());
     let scale = largest.fold(tensor.amax(), f64::max);
-    for (number, g) in list.iter().enumerate() {
+    for g in &list {
         let u = affine(model, g, &centre);
-        apply(number, &u, &mut force);
+        apply(&u, &mut force);
         nodal_forces(model, &integrals, &site_of_node, g, &mut wanted);
         parallel::for_each_mut(&mut worst, 1, |s, worst| {
             let v = volume_of_row(model, s);

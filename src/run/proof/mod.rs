@@ -27,14 +27,11 @@ use crate::observe::proof::{Part, Proof, Severity};
 use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::scene::spec::UnprovenSpec;
-use crate::solve::krylov::LinearMap;
 use crate::system::{BlockCsr, Ranks, SemiDiscrete};
 use crate::{
     coupling::{Coupling, Operator},
     model::Model,
 };
-
-pub use self::affine::displacements as affine_displacements;
 
 /// Subject of the proof: a model laid out, with its conditions.
 pub struct Subject<'a, const D: usize> {
@@ -46,14 +43,12 @@ pub struct Subject<'a, const D: usize> {
     pub operator: &'a Operator<'a, D>,
     /// Settings that the run keeps of the scene.
     pub rest: &'a RunSettings<D>,
-    /// The assembled stiffness, where the run has one; else rows come from the operator.
+    /// The assembled stiffness, where all rows are at hand; else rows come from the operator.
     pub stiffness: Option<&'a BlockCsr>,
-    /// The products with the stiffness, where its rows are spread over processes.
-    pub product: Option<&'a dyn LinearMap>,
-    /// The dynamic system, in a scene that has one; its tangent at rest has the rows.
+    /// Overwrites the second vector by the product of the stiffness, or of the tangent at rest, with the first.
+    pub product: &'a (dyn Fn(&[f64], &mut [f64]) + Sync),
+    /// The dynamic system, in a scene that has one.
     pub system: Option<&'a dyn SemiDiscrete>,
-    /// Forces of the fields of [`affine_displacements`], where they are known already.
-    pub affine_forces: &'a [Vec<f64>],
     /// The processes over which the families of the model may be spread.
     pub ranks: Option<&'a dyn Ranks>,
 }

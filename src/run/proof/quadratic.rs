@@ -236,7 +236,7 @@ fn seam_sites<const D: usize>(
                 && family.iter().all(|&j| whole[j as usize] || !counts(j))
         })
         .collect();
-    if subject.stiffness.is_none() && subject.product.is_none() && seam.len() > MOST {
+    if subject.system.is_some() && seam.len() > MOST {
         let step = seam.len().div_ceil(MOST);
         seam = seam.into_iter().step_by(step).collect();
     }

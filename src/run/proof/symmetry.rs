@@ -11,7 +11,7 @@ const ROUND_OFF: f64 = 1e-12;
 
 /// Compares `xᵀ K y` with `yᵀ K x` for two pseudo-random vectors.
 ///
-/// None without a promise, and without a matrix or a tangent to multiply by: `check` of a static scene measures the pattern instead.
+/// None without a promise.
 pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Option<Part> {
     if subject.coupling.symmetry() != Symmetry::Symmetric || subject.model.body().is_none() {
         return None;
@@ -22,15 +22,10 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Option<Part> {
     let (x, y) = (vector(0), vector(1));
     let product = |u: &[f64]| {
         let mut force = vec![0.0; dofs];
-        match (subject.stiffness, subject.product, subject.system) {
-            (Some(stiffness), ..) => stiffness.multiply_into(u, &mut force),
-            (None, Some(product), _) => product.apply_into(u, &mut force),
-            (None, None, Some(system)) => system.tangent_into(u, &mut force),
-            (None, None, None) => return None,
-        }
-        Some(force)
+        (subject.product)(u, &mut force);
+        force
     };
-    let (kx, ky) = (product(&x)?, product(&y)?);
+    let (kx, ky) = (product(&x), product(&y));
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let size = (dot(&x, &x) * dot(&ky, &ky)).sqrt();
     // of independent entries, the difference of both products is the smaller the more there are
