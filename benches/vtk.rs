@@ -207,7 +207,7 @@ fn fixtures(folder: &Path) {
         (random >> 33) as usize % below
     };
     println!(
-        "\nfile, cells by the library, by vtkio; of {DAMAGED} damaged copies: processes that the library ended by a panic or for want of memory, and vtkio"
+        "\nfile, cells by the library, by vtkio; of {DAMAGED} damaged copies, by the library and by vtkio: ended by a panic or for want of memory, refused, with the place named"
     );
     for file in &files {
         let own = read::<2>(file).map_or_else(|_| "refused".into(), |m| m.cell_count().to_string());
@@ -217,7 +217,7 @@ fn fixtures(folder: &Path) {
         );
         let bytes = std::fs::read(file).unwrap();
         let damaged = folder.join(file.file_name().unwrap());
-        let mut ended = [0, 0];
+        let mut ended = [[0; 3]; 2];
         for copy in 0..DAMAGED {
             let mut bytes = bytes.clone();
             if copy % 10 == 0 {
@@ -231,13 +231,19 @@ fn fixtures(folder: &Path) {
                 // memory that cannot be had ends the process
                 let mut child = Command::new(std::env::current_exe().unwrap());
                 child.args([reader.as_ref(), damaged.as_os_str()]);
-                let status = child.stderr(Stdio::null()).status().unwrap();
-                *ended += usize::from(!status.success());
+                let output = child.stderr(Stdio::null()).output().unwrap();
+                let said = String::from_utf8_lossy(&output.stdout);
+                let has_place = ["line ", "byte ", "cell ", "node "]
+                    .iter()
+                    .any(|w| said.contains(w));
+                ended[0] += usize::from(!output.status.success());
+                ended[1] += usize::from(!said.is_empty());
+                ended[2] += usize::from(has_place);
             }
         }
         let name = file.file_name().unwrap().to_string_lossy();
         println!(
-            "{name:22} {own:>8} {other:>24}   {:4} {:4}",
+            "{name:22} {own:>8} {other:>24}   {:?} {:?}",
             ended[0], ended[1]
         );
     }
@@ -247,11 +253,11 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if let [reader, file] = arguments.as_slice() {
         let file = Path::new(file);
-        match reader == READERS[0] {
-            true => drop(read::<2>(file)),
-            false => drop(loaded(file)),
-        }
-        return;
+        let refused = match reader == READERS[0] {
+            true => read::<2>(file).err().map(|e| e.to_string()),
+            false => loaded(file).err(),
+        };
+        return print!("{}", refused.unwrap_or_default());
     }
     let folder = tempfile::tempdir().unwrap();
     size_and_time(folder.path());
