@@ -279,9 +279,7 @@ fn body_bonds<'a, const D: usize>(
     }
 }
 
-/// Looks at what a seam needs whose faces cut the lattice anywhere, without building it; none if the model has no seam.
-///
-/// It takes all eigenvalues of a dense matrix of the conditions, some ten for each site at the seam.
+/// Collects what a seam needs whose faces cut the lattice anywhere, without building it; none if the model has no seam.
 pub fn seam_conditions<const D: usize>(model: &Model<D>) -> Option<SeamConditions> {
     let (body, passing) = (model.body()?, model.passing()?);
     let mut segments = Segments::new(model, body, passing);
