@@ -321,16 +321,7 @@ const CHUNK: usize = 256;
 /// Tasks that run before their rows are moved into the matrix: what is held twice is one wave, not the whole matrix.
 const WAVE: usize = 16;
 
-/// Assembles a block matrix row by row, in parallel; the same bits for any number of threads.
-pub fn assemble<const D: usize>(
-    sites: usize,
-    advance: impl Fn(u64) + Sync,
-    add_row: impl Fn(usize, &mut Row<D>) + Sync,
-) -> BlockCsr {
-    assemble_rows(sites, sites, advance, add_row)
-}
-
-/// As [`assemble`], with `rows` rows that need not be those of sites.
+/// Assembles a block matrix of `rows` rows, which need not be those of sites, row by row and in parallel; the same bits for any number of threads.
 pub fn assemble_rows<const D: usize>(
     rows: usize,
     sites: usize,
@@ -400,7 +391,7 @@ pub fn assemble_apart<const D: usize>(
 pub struct Pattern {
     /// Blocks of all rows, zero blocks included.
     pub stored: usize,
-    /// Blocks that [`assemble`] would hold, about: equal rows are stored once.
+    /// Blocks that [`assemble_rows`] would hold, about: equal rows are stored once.
     pub distinct: usize,
     /// An estimate of `‖K − Kᵀ‖_F / ‖K‖_F`, from `xᵀ K y − yᵀ K x` with random `x` and `y`.
     pub asymmetry: f64,
@@ -484,7 +475,7 @@ impl<const D: usize> Row<D> {
     }
 }
 
-/// The pattern of the matrix that [`assemble`] would make, and its products with `fields` (`D` numbers per site each); each row is computed and dropped.
+/// The pattern of the matrix that [`assemble_rows`] would make, and its products with `fields` (`D` numbers per site each); each row is computed and dropped.
 pub fn pattern<const D: usize>(
     sites: usize,
     fields: &[Vec<f64>],

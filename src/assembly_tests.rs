@@ -46,7 +46,7 @@ fn remembered_elements_are_told_apart() {
 fn the_pattern_is_that_of_the_matrix() {
     for skew in [0.0, 1e-3] {
         let sites = 10_000;
-        let matrix = assemble(sites, |_| (), ring(sites, skew));
+        let matrix = assemble_rows(sites, sites, |_| (), ring(sites, skew));
         let field: Vec<f64> = (0..2 * sites).map(|k| (k as f64).sin()).collect();
         let found = pattern(
             sites,
@@ -110,7 +110,8 @@ fn a_place_is_the_sum_of_its_weights() {
 #[test]
 fn rows_are_sorted_summed_and_reused() {
     let transfer = Transfer::from_rows([vec![(5, 0.5), (1, 0.5)]]);
-    let matrix = assemble::<2>(
+    let matrix = assemble_rows::<2>(
+        600,
         600,
         |_| {},
         |site, row| {
