@@ -333,16 +333,7 @@ const CHUNK: usize = 256;
 /// Tasks that run before their rows are moved into the matrix: what is held twice is one wave, not the whole matrix.
 const WAVE: usize = 16;
 
-/// Assembles a block matrix row by row, in parallel; the same bits for any number of threads.
-pub fn assemble<const D: usize>(
-    sites: usize,
-    advance: impl Fn(u64) + Sync,
-    add_row: impl Fn(usize, &mut Row<D>) + Sync,
-) -> BlockCsr {
-    assemble_rows(sites, sites, advance, add_row)
-}
-
-/// As [`assemble`], with `rows` rows that need not be those of sites.
+/// Assembles a block matrix of `rows` rows, which need not be those of sites, row by row and in parallel; the same bits for any number of threads.
 pub fn assemble_rows<const D: usize>(
     rows: usize,
     sites: usize,

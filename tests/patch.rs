@@ -232,7 +232,8 @@ fn residual_of_law(case: &Case, material: &str) -> Result<f64, String> {
     } = block_of_law(case, material)?;
     let stiffness = {
         let operator = coupling.operator(&model).map_err(|e| e.to_string())?;
-        model.assemble_unscaled(&operator)
+        let all: Vec<u32> = (0..model.sites.len() as u32).collect();
+        model.assemble_sites_unscaled(&operator, &all)
     };
     let tensor = *model.tensor_of_cell(0);
     let size = tensor.amax() / typed::YOUNGS_MODULUS;

@@ -75,8 +75,6 @@ pub struct Need {
     pub remaining: f64,
     /// The part of the square of `all_local` that each cell has.
     pub squares: Vec<f64>,
-    /// The largest principal strain; zero if no bond breaks.
-    pub largest_strain: f64,
 }
 
 /// `ℓ²/δ²` of bonds with the micromodulus `lambda(r)` \[any unit\] and the horizon `horizon` \[m\].
@@ -176,7 +174,6 @@ impl<const D: usize> Criteria<'_, D> {
             all_local,
             remaining,
             squares: wrong,
-            largest_strain: largest.iter().copied().fold(0.0, f64::max),
         }
     }
 

@@ -76,7 +76,8 @@ impl<const D: usize> Model<D> {
     /// Assembles the stiffness: the rows of the operator, each times its [`Model::row_scale`].
     pub fn assemble(&self, operator: &Operator<'_, D>, progress: &dyn Progress) -> BlockCsr {
         progress.stage("assembly", Some(self.sites.len() as u64));
-        let matrix = assembly::assemble(
+        let matrix = assembly::assemble_rows(
+            self.sites.len(),
             self.sites.len(),
             |by| progress.advance(by),
             |site, row| self.add_scaled_row(operator, site, row),
@@ -117,13 +118,7 @@ impl<const D: usize> Model<D> {
             .collect()
     }
 
-    /// Assembles the rows as the operator writes them, each an equation at its site: for studies of a method, whose sums of forces hold before rows are scaled.
-    pub fn assemble_unscaled(&self, operator: &Operator<'_, D>) -> BlockCsr {
-        let sites: Vec<u32> = (0..self.sites.len() as u32).collect();
-        self.assemble_sites_unscaled(operator, &sites)
-    }
-
-    /// The same rows of some sites, in the order of `sites`.
+    /// Assembles the rows of some sites, in the order of `sites`, as the operator writes them, each an equation at its site: for studies of a method, whose sums of forces hold before rows are scaled.
     pub fn assemble_sites_unscaled(&self, operator: &Operator<'_, D>, sites: &[u32]) -> BlockCsr {
         assembly::assemble_rows(
             sites.len(),

@@ -13,24 +13,11 @@ pub fn nodal_volumes<const D: usize>(
 ) -> Vec<f64> {
     let mut volumes = vec![0.0; mesh.nodes.len()];
     for c in cells {
-        add_nodal(mesh, c, 1.0, &mut volumes);
+        for_each_share(mesh, c, |n, part, volume| {
+            volumes[n as usize] += part * volume
+        });
     }
     volumes
-}
-
-/// Lumped mass of every node \[kg\], as [`for_each_share`] has it; `density` gives each cell's ρ [kg/m^D].
-pub fn lumped_mass<const D: usize>(mesh: &Mesh<D>, density: impl Fn(usize) -> f64) -> Vec<f64> {
-    let mut mass = vec![0.0; mesh.nodes.len()];
-    for c in 0..mesh.cell_count() {
-        add_nodal(mesh, c, density(c), &mut mass);
-    }
-    mass
-}
-
-fn add_nodal<const D: usize>(mesh: &Mesh<D>, c: usize, scale: f64, totals: &mut [f64]) {
-    for_each_share(mesh, c, |n, part, volume| {
-        totals[n as usize] += scale * part * volume
-    });
 }
 
 /// Hands the share of each node of cell `c` in its volume to `add`, perhaps in pieces, as a fraction of a volume \[m^D\]: `∫ N_a dV` of a linear cell.
@@ -138,7 +125,7 @@ mod tests {
 
     fn forces_of_a_body<const D: usize>() {
         for mesh in boxes::<D>(3, 0.2) {
-            let mass = lumped_mass(&mesh, |_| 1.0);
+            let mass = nodal_volumes(&mesh, 0..mesh.cell_count());
             let mut uniform = vec![0.0; mesh.nodes.len()];
             let (mut total, mut moment) = (0.0, 0.0);
             for c in 0..mesh.cell_count() {

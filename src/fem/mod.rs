@@ -86,15 +86,15 @@ pub use cut::{places_of_part, rule_of_parts};
 pub use divided::may_be_divided;
 pub use element::{
     QuadraturePoint, cell_volume, displacement_gradient, displacement_gradient_at,
-    displacement_gradient_at_centre, for_each_point, quadrature, quadrature_of, row_at,
-    shape_values, stiffness_into,
+    displacement_gradient_at_centre, for_each_point, quadrature, row_at, shape_values,
+    stiffness_into,
 };
 pub use load::{
     FacetPoint, body_force_vector, facet_area, facet_normals, facet_points, outward_points,
     outward_traction_vector, traction_vector,
 };
 pub use locate::{Located, Locator, reference_of};
-pub use lumping::{for_each_share, lumped_body_force_vector, lumped_mass, nodal_volumes};
+pub use lumping::{for_each_share, lumped_body_force_vector, nodal_volumes};
 pub use nonlinear::NonlinearElements;
 pub use superconvergent::{position_in, superconvergent_gradient};
 

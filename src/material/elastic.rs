@@ -1,7 +1,7 @@
 //! Isotropic linear elasticity.
 
-use super::{Banded, Kinematics, LocalHistory, LocalLaw, LocalResponse, MaterialError};
-use crate::tensor::{Tensor, Tensor4};
+use super::{Kinematics, MaterialError};
+use crate::tensor::Tensor4;
 
 /// An isotropic, linearly elastic solid, validated.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -61,11 +61,6 @@ impl Elastic {
         self.youngs_modulus / (2.0 * (1.0 + self.poisson_ratio))
     }
 
-    /// Bulk modulus `K = E / (3 (1 − 2ν))` \[Pa\] of the three-dimensional solid.
-    pub fn bulk_modulus(&self) -> f64 {
-        self.youngs_modulus / (3.0 * (1.0 - 2.0 * self.poisson_ratio))
-    }
-
     /// The Lamé parameters (λ_D, μ) \[Pa\] of `D` dimensions: `C_ijkl = λ_D δ_ij δ_kl + μ (δ_ik δ_jl + δ_il δ_jk)`.
     ///
     /// | kinematics | λ_D |
@@ -111,85 +106,10 @@ impl Elastic {
     }
 }
 
-/// The law `σ = C : G`, `W = ½ G : C : G` of an [`Elastic`] solid in `D` dimensions.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LinearElastic<const D: usize> {
-    stiffness: Tensor4<D>,
-    /// Stress out of the plane per dilatation \[Pa\].
-    across: f64,
-}
-
-impl<const D: usize> LinearElastic<D> {
-    /// The law of `solid` under `kinematics`.
-    ///
-    /// # Errors
-    /// `MaterialError::Kinematics` if the kinematics belong to another dimension than `D`.
-    pub fn new(solid: &Elastic, kinematics: Kinematics) -> Result<Self, MaterialError> {
-        let (lambda, _) = solid.lame::<D>(kinematics)?;
-        Ok(Self {
-            stiffness: solid.stiffness(kinematics)?,
-            across: match kinematics {
-                Kinematics::PlaneStrain => lambda,
-                _ => 0.0,
-            },
-        })
-    }
-}
-
-impl<const D: usize> LocalLaw<D> for LinearElastic<D> {
-    fn tangent(&self) -> &Tensor4<D> {
-        &self.stiffness
-    }
-
-    fn is_linear(&self) -> bool {
-        true
-    }
-
-    fn is_objective(&self) -> bool {
-        false
-    }
-
-    fn flows_at_constant_volume(&self) -> bool {
-        false
-    }
-
-    fn history(&self) -> LocalHistory {
-        LocalHistory::NONE
-    }
-
-    fn algorithmic_tangent(&self, _gradient: &Tensor<D>, _step: f64, _past: &[f64]) -> Tensor4<D> {
-        self.stiffness
-    }
-
-    fn has_symmetric_tangent(&self) -> bool {
-        true
-    }
-
-    fn in_band(&self, _width: f64) -> Option<Banded<D>> {
-        None
-    }
-
-    fn respond(
-        &self,
-        gradient: &Tensor<D>,
-        _step: f64,
-        _past: &[f64],
-        _present: &mut [f64],
-    ) -> LocalResponse<D> {
-        let stress = self.stiffness.contract(gradient);
-        LocalResponse {
-            stress,
-            across: self.across * gradient.trace(),
-            volume_ratio: 1.0,
-            stored: 0.5 * stress.dot(gradient),
-            dissipated: 0.0,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tensor::Tensor;
 
     #[test]
     fn reduced_laws_are_the_solid_with_its_constraint() {
@@ -216,6 +136,5 @@ mod tests {
 
         let c1 = solid.stiffness::<1>(Kinematics::Bar).unwrap();
         assert!((c1.get(0, 0, 0, 0) / e - 1.0).abs() < 1e-15);
-        assert!((solid.bulk_modulus() / 175e9 - 1.0).abs() < 1e-14);
     }
 }

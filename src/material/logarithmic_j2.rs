@@ -363,18 +363,6 @@ mod tests {
     }
 
     #[test]
-    fn pure_shear_hardens_as_the_flow_rule_says() {
-        // stretches e^γ/2, e^−γ/2, 1: τ = σ_y/√3 at first, then dτ/dγ = 1/(1/μ + 3/H)
-        let gamma = 0.8f64;
-        let first = YIELD / 3f64.sqrt();
-        let expected = first + (gamma - first / LAME.1) / (1.0 / LAME.1 + 3.0 / MODULUS);
-        let g = Vector::<3>::new((0.5 * gamma).exp_m1(), (-0.5 * gamma).exp_m1(), 0.0);
-        let (found, ..) = along(&law(), &[Tensor::from_diagonal(&g)]);
-        let kirchhoff = found.stress[(0, 0)] * (1.0 + g[0]);
-        assert!((kirchhoff - expected).abs() < 1e-10 * YIELD, "{kirchhoff}");
-    }
-
-    #[test]
     fn a_rotation_of_the_path_rotates_the_stress_and_leaves_the_history() {
         let (sine, cosine) = 1.1f64.sin_cos();
         let turn = Tensor::<3>::new(1.0, 0.0, 0.0, 0.0, cosine, -sine, 0.0, sine, cosine);

@@ -38,7 +38,7 @@ mod tangent_tests;
 mod user_routine;
 
 pub(crate) use algorithmic_tangent::central_differences;
-pub use elastic::{Elastic, LinearElastic};
+pub use elastic::Elastic;
 pub use expanding::{Expanding, begin_heating, heat_work};
 pub use generalised_maxwell::GeneralisedMaxwell;
 pub use hardening::{Hardening, JohnsonCook};
@@ -312,10 +312,6 @@ mod tests {
         kinematics: &[Kinematics],
     ) -> Vec<(String, Box<dyn LocalLaw<D>>)> {
         let mut laws: Vec<(String, Box<dyn LocalLaw<D>>)> = Vec::new();
-        for &k in kinematics {
-            let law = LinearElastic::<D>::new(&elastic(), k).unwrap();
-            laws.push((format!("linear elastic, {}", k.name()), Box::new(law)));
-        }
         for kinematics in kinematics
             .iter()
             .filter(|k| J2::<D>::KINEMATICS.contains(k))

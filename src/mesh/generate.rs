@@ -2,7 +2,6 @@
 
 use super::error::axis_name;
 use super::{CellShape, Mesh, MeshError};
-use crate::shape::Shape;
 use crate::tensor::Vector;
 
 /// Tolerance of a cut-out's face against a grid line, as a fraction of the axis.
@@ -234,7 +233,6 @@ pub struct Grid<const D: usize> {
     division: Division,
     cut_outs: Vec<CutOut<D>>,
     jitter: Option<(f64, u64)>,
-    still: Shape<D>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -266,7 +264,6 @@ impl<const D: usize> Grid<D> {
             division: Division::Boxes,
             cut_outs: Vec::new(),
             jitter: None,
-            still: Shape::Union(Vec::new()),
         }
     }
 
@@ -287,12 +284,6 @@ impl<const D: usize> Grid<D> {
     /// Nodes of the outer boundary and of cut-outs stay. The same `seed` gives the same mesh on every machine.
     pub fn jitter(&mut self, fraction: f64, seed: u64) -> &mut Self {
         self.jitter = Some((fraction, seed));
-        self
-    }
-
-    /// Nodes in this shape stay where they are under [`Grid::jitter`].
-    pub fn keep_still(&mut self, shape: Shape<D>) -> &mut Self {
-        self.still = shape;
         self
     }
 
@@ -433,12 +424,8 @@ impl<const D: usize> Grid<D> {
         for &n in mesh.outer_facets().iter().flat_map(|f| &f.nodes) {
             fixed[n as usize] = true;
         }
-        let extent = lines
-            .iter()
-            .map(|x| x[x.len() - 1] - x[0])
-            .fold(0.0, f64::max);
         for (n, x) in mesh.nodes.iter_mut().enumerate() {
-            if fixed[n] || self.still.contains(x, ON_GRID * extent) {
+            if fixed[n] {
                 continue;
             }
             let at = split(n, nodes);

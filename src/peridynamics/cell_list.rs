@@ -235,34 +235,6 @@ impl Families {
         )
     }
 
-    /// The families of some points of a cloud: row `r` is that of point `centres[r]`, whose horizon is `horizons[r]`.
-    ///
-    /// # Errors
-    /// As [`Families::search`]; also if a centre is no point of the cloud.
-    pub fn search_centres<const D: usize>(
-        points: &[Vector<D>],
-        centres: &[u32],
-        horizons: &[f64],
-        tie_tolerance: f64,
-    ) -> Result<Self, FamilyError> {
-        let queries = centres
-            .iter()
-            .map(|&c| points.get(c as usize).copied())
-            .collect::<Option<Vec<_>>>()
-            .ok_or(FamilyError::Length {
-                what: "the cloud",
-                length: points.len(),
-                wanted: "fewer than a centre's number needs",
-            })?;
-        let grid = Grid::new(points, &queries, horizons)?;
-        grid.families(
-            queries.len(),
-            |r| (queries[r], horizons[r], Some(centres[r])),
-            Coincidence::Refused,
-            tie_tolerance,
-        )
-    }
-
     /// The families of query points that need not be in the cloud, Gauss points of a cell say.
     ///
     /// `selves[r]` is the cloud point that query `r` is, if it is one. Any cloud point on which a query lies is left out, since a bond

@@ -399,21 +399,6 @@ mod tests {
     }
 
     #[test]
-    fn closed_moments_match_quadrature() {
-        let delta = 0.7;
-        for omega in influences() {
-            for p in 1..=4 {
-                let numeric = integrate(0.0, delta, 8, |r| omega.value(r, delta) * r.powi(p));
-                let closed = omega.radial_moment(p as u32, delta);
-                assert!(
-                    (numeric / closed - 1.0).abs() < 1e-12,
-                    "{omega:?} {p}: {numeric} {closed}"
-                );
-            }
-        }
-    }
-
-    #[test]
     fn constants_give_the_typed_tensor() {
         let (delta, e) = (0.3, 7.0);
         for shape in micromoduli() {

@@ -6,15 +6,10 @@ use super::setup::{self, problem};
 use crate::coupling::semidiscrete::masses;
 use crate::material::LocalLaw;
 use crate::progress::Silent;
-use crate::run::AnyScene;
 use crate::run::error::RunError;
 use crate::scene::validated::Scene;
 use crate::system::{BlockCsr, LinearMotion};
-use crate::tensor::padded;
-use crate::{
-    coupling::{Coupling, Operator},
-    model::Model,
-};
+use crate::{coupling::Coupling, model::Model};
 
 /// The sites and bonds of a scene as its run lays them out: bonds intact, nothing loaded or held, nothing proved.
 pub struct SceneModel<const D: usize> {
@@ -59,49 +54,10 @@ impl<const D: usize> SceneModel<D> {
     /// As [`SceneModel::stiffness`].
     pub fn motion(&self) -> Result<LinearMotion, RunError> {
         let operator = self.coupling.operator(&self.model)?;
-        Ok(self.motion_by(&operator))
-    }
-
-    fn motion_by(&self, operator: &Operator<'_, D>) -> LinearMotion {
-        LinearMotion {
-            stiffness: self.model.assemble(operator, &Silent),
+        Ok(LinearMotion {
+            stiffness: self.model.assemble(&operator, &Silent),
             mass: masses(&self.model, |material| self.density[material as usize]),
             symmetry: self.coupling.symmetry(),
-        }
+        })
     }
-}
-
-/// Stiffness and masses of a scene at rest, bonds intact and nothing held.
-pub struct LinearModel {
-    /// Stiffness, and lumped mass of each site \[kg\].
-    pub motion: LinearMotion,
-    /// Place of each site \[m\], padded with zeros.
-    pub position: Vec<[f64; 3]>,
-    /// Blending function of each site: 1 where it is peridynamic, 0 where it is local.
-    pub beta: Vec<f64>,
-}
-
-impl AnyScene {
-    /// The model of the scene as matrices; its conditions and cracks in time are left out.
-    ///
-    /// # Errors
-    /// [`RunError`] of the model or its coupling.
-    pub fn linear_model(self) -> Result<LinearModel, RunError> {
-        match self {
-            Self::Bar(scene) => linear_model(scene.scene),
-            Self::Plane(scene) => linear_model(scene.scene),
-            Self::Solid(scene) => linear_model(scene.scene),
-        }
-    }
-}
-
-fn linear_model<const D: usize>(scene: Scene<D>) -> Result<LinearModel, RunError> {
-    let laid = SceneModel::new(scene)?;
-    let operator = laid.coupling.operator(&laid.model)?;
-    let sites = &laid.model.sites;
-    Ok(LinearModel {
-        beta: (0..sites.len()).map(|s| (operator.beta)(s)).collect(),
-        position: sites.iter().map(|s| padded(&s.position)).collect(),
-        motion: laid.motion_by(&operator),
-    })
 }

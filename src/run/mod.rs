@@ -74,7 +74,7 @@ pub use crate::run::placed_scene::PlacedScene;
 pub use any_scene::AnyScene;
 pub use budget::{Share, memory_budget, set_memory_budget};
 pub use error::RunError;
-pub use linear::{LinearModel, SceneModel};
+pub use linear::SceneModel;
 pub use motion::{RunOptions, StartFrom};
 pub use results::{BuildError, Frame, NoSuchField, Solution, Table};
 pub use samples::Samples;

@@ -1,6 +1,8 @@
 //! Symmetry, rigid motions, masses and energies of models with a rim.
 
-use bondline::run::LinearModel;
+use bondline::run::SceneModel;
+use bondline::system::LinearMotion;
+use bondline::tensor::padded;
 use bondline::{Condition, Function, Initial, Material, Region, SceneBuilder, Silent};
 
 use super::meshes::{Body, Random};
@@ -24,16 +26,27 @@ pub fn truncated<const D: usize>(body: &Body<D>, material: Material, shape: Draw
         .coupling("truncated")
 }
 
-/// The matrices of a scene, which has to be held to be one; supports are left out of them.
-fn model(scene: &SceneBuilder) -> LinearModel {
+/// A scene as matrices.
+pub struct LinearModel {
+    pub motion: LinearMotion,
+    /// Place of each site \[m\], padded with zeros.
+    position: Vec<[f64; 3]>,
+}
+
+/// The matrices of a scene; its supports are left out of them.
+pub fn matrices<const D: usize>(scene: &SceneBuilder) -> LinearModel {
+    let scene = scene.scene().unwrap().of_dimension::<D>().unwrap();
+    let laid = SceneModel::new(scene).unwrap();
+    LinearModel {
+        motion: laid.motion().unwrap(),
+        position: (laid.model.sites.iter().map(|s| padded(&s.position))).collect(),
+    }
+}
+
+/// The same of a scene without supports, which has to be held to be one.
+fn model<const D: usize>(scene: &SceneBuilder) -> LinearModel {
     let held = Condition::displacement("left").x(0.0);
-    scene
-        .clone()
-        .condition("held", held)
-        .scene()
-        .unwrap()
-        .linear_model()
-        .unwrap()
+    matrices::<D>(&scene.clone().condition("held", held))
 }
 
 /// The stiffness in full, row by row.
@@ -99,7 +112,7 @@ fn is_definite(mut a: Vec<Vec<f64>>) -> bool {
 ///
 /// With K R = 0 for orthonormal rigid motions R, `K + c R Rᵀ − STIFF c I` is definite only if every other eigenvalue is above `STIFF c`.
 pub fn assert_symmetric_and_stiff<const D: usize>(scene: &SceneBuilder, case: &str) {
-    let model = model(scene);
+    let model = model::<D>(scene);
     let mut k = dense(&model);
     let n = k.len();
     let largest = (0..n).map(|i| k[i][i].abs()).fold(0.0, f64::max);
@@ -179,7 +192,7 @@ fn solids_whose_surface_cuts_the_zone_off_the_lattice_turn_without_force() {
 
 /// Mass is that of the body, and positive.
 pub fn assert_mass<const D: usize>(scene: &SceneBuilder, body: &Body<D>) -> LinearModel {
-    let model = model(scene);
+    let model = model::<D>(scene);
     let wanted = DENSITY * body.volume();
     let total: f64 = model.motion.mass.iter().sum();
     println!("{D}D mass {:e}", total / wanted - 1.0);

@@ -223,8 +223,9 @@ impl<const D: usize> Enclosed<D> {
         let (stiffness, shared) = {
             let operator = coupling.operator(&model).map_err(SceneFailure::from)?;
             let rows = |sites: &[u32]| model.assemble_sites_unscaled(&operator, sites);
+            let all: Vec<u32> = (0..model.sites.len() as u32).collect();
             match ranks {
-                None => (model.assemble_unscaled(&operator), None),
+                None => (rows(&all), None),
                 Some(ranks) => {
                     let partition = model
                         .distribute(ranks.count(), false, Some(ranks))
@@ -233,7 +234,6 @@ impl<const D: usize> Enclosed<D> {
                         ranks,
                         partition: &partition,
                     };
-                    let all: Vec<u32> = (0..model.sites.len() as u32).collect();
                     let (stiffness, own) = (spread.gather_rows(&all, rows), rows(spread.own()));
                     (stiffness, Some(SharedRows { partition, own }))
                 }

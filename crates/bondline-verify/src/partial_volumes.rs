@@ -2,17 +2,19 @@
 //!
 //! Source: [SAND2015-7998] section 5.2.1 and the algorithm of figure 5.7.
 
+mod hexahedron;
+mod sampling;
+
 use std::{f64::consts::PI, hint::black_box, time::Instant};
 
+use self::hexahedron::Hexahedron;
+use self::sampling::{SAND_LEVELS, SAND_SAMPLES_PER_EDGE, subdivide_and_sample};
 use crate::{Effort, convergence::norms::median};
 use bondline::{
     observe::report::{Columns, Table, TableRow},
     peridynamics::{
         BoxCell, Micromodulus, PartialVolume, ShellTarget, TIE_TOLERANCE, isotropic_shell_factors,
-        partial_volume::{
-            Hexahedron, SAND_LEVELS, SAND_SAMPLES_PER_EDGE, lattice_cells, lattice_shells,
-            subdivide_and_sample,
-        },
+        partial_volume::{lattice_cells, lattice_shells},
     },
     progress::Progress,
     tensor::{Tensor4, Vector},
@@ -202,7 +204,7 @@ fn partitions() -> Table {
         let Ok(cell) = BoxCell::new(low, low + edges) else {
             continue;
         };
-        let Ok(hexahedron) = turned(&cell) else {
+        let Some(hexahedron) = turned(&cell) else {
             continue;
         };
         let exact = cell.ball_measure(&Vector::zeros(), 1.0);
@@ -220,7 +222,7 @@ fn partitions() -> Table {
 }
 
 /// A box turned about the origin, by the angle of a 3-4-5 triangle about z and then about x.
-fn turned(cell: &BoxCell<3>) -> Result<Hexahedron, bondline::peridynamics::PartialVolumeError> {
+fn turned(cell: &BoxCell<3>) -> Option<Hexahedron> {
     let (low, high) = cell.corners();
     let (c, s) = (0.8, 0.6);
     Hexahedron::new(

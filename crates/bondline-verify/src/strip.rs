@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 use crate::enclosed::{Law, Method};
 use crate::meshes::scene;
 use crate::typed;
-use bondline::run::LinearModel;
 use bondline::system::LinearMotion;
+use bondline::tensor::padded;
 
 /// Model along the strip.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,16 +81,19 @@ impl Strip {
     /// The message of the refusal of its scene.
     pub fn new<const D: usize>(case: &StripCase) -> Result<Strip, String> {
         let borders = case.borders();
-        let LinearModel {
-            motion,
-            position,
-            beta,
-        } = scene::linear_model(&case.text::<D>())?;
+        let laid = scene::model::<D>(&case.text::<D>(), &[]).map_err(|e| e.to_string())?;
+        let operator = laid.coupling.operator(&laid.model);
+        let operator = operator.map_err(|e| e.to_string())?;
+        let sites = &laid.model.sites;
+        let along = |axis: usize| {
+            let at = sites.iter().map(|s| padded(&s.position)[axis]);
+            at.collect()
+        };
         Ok(Strip {
-            beta,
-            x: position.iter().map(|x| x[0]).collect(),
-            y: position.iter().map(|x| x[1]).collect(),
-            motion,
+            beta: (0..sites.len()).map(|s| (operator.beta)(s)).collect(),
+            x: along(0),
+            y: along(1),
+            motion: laid.motion().map_err(|e| e.to_string())?,
             borders: [borders[1], borders[2], borders[3], borders[4]],
         })
     }

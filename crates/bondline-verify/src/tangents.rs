@@ -231,8 +231,10 @@ fn position_aware_density<const D: usize>(
 
 /// The stiffness of a body alone.
 pub fn stiffness<const D: usize>(body: &PdBody<D>) -> BlockCsr {
-    assembly::assemble(
-        body.cloud.position.len(),
+    let sites = body.cloud.position.len();
+    assembly::assemble_rows(
+        sites,
+        sites,
         |_| {},
         |site, row| body.add_force_row(site, |_| 1.0, row),
     )

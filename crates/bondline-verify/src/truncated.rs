@@ -1,6 +1,7 @@
 //! Truncated bonds, measured: symmetry, definiteness, affine fields, equilibrium, order in the horizon, and the savings by a symmetric matrix.
 
 mod compared;
+mod seam_conditions;
 mod zones;
 
 use std::time::Instant;

@@ -21,27 +21,20 @@ use crate::coupling::truncated::fit_parts::{
 use crate::coupling::truncated::lps_constants::state_of;
 use crate::{model::ModelError, peridynamics::StatePart, tensor::Vector};
 
-/// Largest factor of an energy that [`SeamConditions::out_of_reach`] considers.
-const MOST_FACTOR: f64 = 1e3;
-
 /// Missing force on a node, relative to the largest traction of a face, below which a seam follows the lattice.
 const FOLLOWS: f64 = 1e-10;
 
 const NONE: u32 = u32::MAX;
 
-/// The conditions of a seam whose faces cut the lattice anywhere, for an affine field.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The conditions on the energies of a seam whose faces cut the lattice anywhere, for an affine field.
+#[derive(Clone, Debug, PartialEq)]
 pub struct SeamConditions {
-    /// Number of conditions.
-    pub conditions: usize,
-    /// Number of independent conditions.
-    pub rank: usize,
-    /// Number of energies that may change: pieces, and whole bonds between points at the seam and their neighbours.
-    pub unknowns: usize,
-    /// Residual that no change of them can remove, relative to what is missing: zero if there are factors, of any sign, that meet all conditions.
-    pub unreachable: f64,
-    /// Residual that no factors between 0.1 and 1000 can remove, a lower bound; zero if none is found.
-    pub out_of_reach: f64,
+    /// Missing amount in each condition.
+    pub target: Vec<f64>,
+    /// For each energy that may change (pieces, and whole bonds between points at the seam and their neighbours) the conditions in which it counts, and what a change of its factor by 1 adds to them.
+    pub columns: Vec<Vec<(usize, f64)>>,
+    /// The least change of a factor by which an energy stays positive.
+    pub floor: f64,
 }
 
 /// Returns the conditions of the pairwise part.
@@ -50,14 +43,12 @@ pub(super) fn conditions<const D: usize>(segments: &mut Segments<'_, D>) -> Seam
     segments.widen();
     let parts = parts(segments);
     let (conditions, target) = pair_conditions(segments, &parts, &missing);
-    let (rank, unreachable) = conditions.rank(&target);
-    let out_of_reach = conditions.out_of_reach(&target, FLOOR - 1.0, MOST_FACTOR - 1.0);
     SeamConditions {
-        conditions: target.len(),
-        rank,
-        unknowns: parts.len(),
-        unreachable,
-        out_of_reach,
+        target,
+        columns: (0..conditions.changes())
+            .map(|k| conditions.column(k).collect())
+            .collect(),
+        floor: FLOOR - 1.0,
     }
 }
 

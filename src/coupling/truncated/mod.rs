@@ -280,8 +280,6 @@ fn body_bonds<'a, const D: usize>(
 }
 
 /// Returns the conditions that a seam has to meet whose faces cut the lattice anywhere, without building it; none if the model has no seam.
-///
-/// Computes all eigenvalues of a dense matrix of the conditions: 1, 4 or 10 for each site at the seam in 1D, 2D, 3D.
 pub fn seam_conditions<const D: usize>(model: &Model<D>) -> Option<SeamConditions> {
     let (body, passing) = (model.body()?, model.passing()?);
     let mut segments = Segments::new(model, body, passing);

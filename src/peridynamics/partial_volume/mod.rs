@@ -8,8 +8,6 @@
 //! | `length.rs` | exact lengths in 1D | section 5.3 |
 //! | `area.rs` | exact areas in 2D, disc against rectangle | section 5.4 (PA-AC) |
 //! | `volume.rs` | exact volumes in 3D, ball against box | in the place of PV-NC |
-//! | `sampling.rs` | recursive subdivision and sampling | section 5.5 (PV-NC) |
-//! | `hexahedron.rs` | ball against a general hexahedron, in closed form too | section 5.5, "nonuniform grids" |
 //! | `lattice.rs` | the shares of all cells around a lattice point | |
 //!
 //! Lengths, areas and volumes that are exact do not know ties: they change continuously with the horizon. The first algorithm does, and the
@@ -17,17 +15,13 @@
 
 mod area;
 mod full;
-mod hexahedron;
 mod hhb;
 mod lattice;
 mod length;
 mod pdlammps;
-mod sampling;
 mod volume;
 
-pub use hexahedron::Hexahedron;
 pub use lattice::{LatticeCell, lattice_cells, lattice_shells, orbit};
-pub use sampling::{SAND_LEVELS, SAND_SAMPLES_PER_EDGE, subdivide_and_sample};
 
 use crate::tensor::Vector;
 
@@ -102,16 +96,6 @@ pub enum PartialVolumeError {
         low: Vec<f64>,
         /// Upper corner.
         high: Vec<f64>,
-    },
-    /// A hexahedron that is flat or turned inside out.
-    #[error(
-        "partial volume: the hexahedron with first corner {corner:?} has the volume {volume}; number its corners as VTK does, so that it is positive"
-    )]
-    Hexahedron {
-        /// Its first corner.
-        corner: [f64; 3],
-        /// Its signed volume.
-        volume: f64,
     },
     /// A ratio of horizon to spacing without a family.
     #[error("partial volumes: horizon / spacing is {ratio}; choose a ratio from 1 to 1000")]

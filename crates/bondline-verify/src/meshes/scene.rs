@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use bondline::model::ModelError;
 use bondline::observe::summary::RunSummary;
 use bondline::progress::Silent;
-use bondline::run::{AnyScene, LinearModel, RunError, Samples, SceneModel, Solved, solve_with};
+use bondline::run::{AnyScene, RunError, Samples, SceneModel, Solved, solve_with};
 use bondline::scene::{Scene, Source};
 use bondline::tensor::Vector;
 use bondline_study::Prediction;
@@ -119,17 +119,6 @@ pub fn check(text: &str, overrides: &[&str], files: &[(&str, &str)]) -> Result<P
     let folder = Folder::with(files)?;
     let scene = load(text, overrides, &folder)?;
     bondline_study::predict(scene, &Silent).map_err(|e| e.to_string())
-}
-
-/// A scene as matrices.
-///
-/// # Errors
-/// The message of a refusal.
-pub fn linear_model(text: &str) -> Result<LinearModel, String> {
-    let folder = Folder::with(&[])?;
-    load(text, &[], &folder)?
-        .linear_model()
-        .map_err(|e| e.to_string())
 }
 
 /// Displacements of a static scene at `places`, which become its own sites where there are none; see [`AnyScene::samples`].

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::seam_conditions::Conditions;
 use super::{AFFINE_LIMIT, Material, rows_of};
 use crate::{
     Effort,
@@ -17,6 +18,9 @@ use bondline::{
     peridynamics::Micromodulus,
     progress::Progress,
 };
+
+/// Largest factor of an energy for which it is shown that none helps.
+const MOST_FACTOR: f64 = 1e3;
 
 /// The shape of a zone; lengths are in cells, the zone reaches from −`half` to `half` where nothing else is said.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -193,14 +197,18 @@ fn obstruction<const D: usize>(grain: Grain, ratio: u32) -> Vec<TableRow> {
     };
     let mut rows = Vec::new();
     if let Some(found) = seam_conditions(&laid.model) {
-        rows.push(TableRow::info(&name, "conditions", found.conditions as f64));
-        rows.push(TableRow::info(&name, "rank", found.rank as f64));
-        rows.push(TableRow::info(&name, "unknowns", found.unknowns as f64));
-        rows.push(TableRow::info(&name, "unreachable", found.unreachable));
+        let (count, unknowns) = (found.target.len(), found.columns.len());
+        let floor = found.floor;
+        let conditions = Conditions::of(found);
+        let (rank, unreachable) = conditions.rank();
+        rows.push(TableRow::info(&name, "conditions", count as f64));
+        rows.push(TableRow::info(&name, "rank", rank as f64));
+        rows.push(TableRow::info(&name, "unknowns", unknowns as f64));
+        rows.push(TableRow::info(&name, "unreachable", unreachable));
         rows.push(TableRow::info(
             &name,
             "unreachable by factors of 0.1 to 1000, at least",
-            found.out_of_reach,
+            conditions.out_of_reach(floor, MOST_FACTOR - 1.0),
         ));
     }
     rows.push(match laid.coupling.operator(&laid.model) {

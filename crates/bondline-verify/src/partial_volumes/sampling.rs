@@ -1,7 +1,6 @@
 //! Recursive subdivision and sampling, the numerical calculation (PV-NC) of the report.
 
-use super::BoxCell;
-use crate::tensor::Vector;
+use bondline::{peridynamics::BoxCell, tensor::Vector};
 
 /// Levels of subdivision in [SAND2015-7998] section 5.5.
 pub const SAND_LEVELS: u32 = 6;
@@ -73,4 +72,30 @@ fn part<const D: usize>(
         })
         .count();
     step.product() * inside as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sampling_approaches_the_closed_form() {
+        let cell = BoxCell::new(
+            Vector::<3>::new(0.2, 0.3, 0.4),
+            Vector::<3>::new(0.7, 0.9, 0.8),
+        )
+        .unwrap();
+        let exact = cell.ball_measure(&Vector::zeros(), 0.9);
+        let error = |levels| {
+            let sampled =
+                subdivide_and_sample(&cell, &Vector::zeros(), 0.9, levels, SAND_SAMPLES_PER_EDGE);
+            (sampled / exact - 1.0).abs()
+        };
+        assert!(error(1) > error(5));
+        let six = error(SAND_LEVELS);
+        assert!(six < 1e-4 && six > 1e-12, "{six:e}");
+        // no level at all is plain sampling: 64 points
+        let whole = subdivide_and_sample(&cell, &Vector::zeros(), 0.9, 0, SAND_SAMPLES_PER_EDGE);
+        assert!(((whole / cell.measure() * 64.0).fract()).abs() < 1e-9);
+    }
 }

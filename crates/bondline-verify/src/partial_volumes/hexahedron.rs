@@ -5,8 +5,7 @@
 //! part of an edge inside the disc adds a cone over a triangle, `d/3 · ½ |a × b|`, and each part outside, seen from the foot under the angle φ, adds
 //! the cone over a sector and the ball's own cone beyond it, `d/3 · ½ ρ² φ + R³/3 (Ω − φ (1 − d/R))`, where Ω is the solid angle of the triangle.
 
-use super::PartialVolumeError;
-use crate::tensor::Vector;
+use bondline::tensor::Vector;
 
 /// A hexahedron; corners in the order of VTK and Gmsh (bottom face counter-clockwise seen from the top face, then the top face).
 ///
@@ -28,21 +27,11 @@ const FACES: [[usize; 4]; 6] = [
 ];
 
 impl Hexahedron {
-    /// A hexahedron from its corners \[m\].
-    ///
-    /// # Errors
-    /// [`PartialVolumeError::Hexahedron`] if its volume is not positive.
-    pub fn new(corners: [Vector<3>; 8]) -> Result<Self, PartialVolumeError> {
+    /// A hexahedron from its corners \[m\]; none unless its volume is positive.
+    pub fn new(corners: [Vector<3>; 8]) -> Option<Self> {
         let cell = Self { corners };
         let volume = cell.volume();
-        if volume.is_finite() && volume > 0.0 {
-            Ok(cell)
-        } else {
-            Err(PartialVolumeError::Hexahedron {
-                corner: corners[0].into(),
-                volume,
-            })
-        }
+        (volume.is_finite() && volume > 0.0).then_some(cell)
     }
 
     /// Its volume, that of the trilinear cell. Units: \[m³\].
@@ -145,4 +134,98 @@ fn edge(a: &Vector<3>, b: &Vector<3>, normal: &Vector<3>, d: f64, radius: f64) -
         sum += beyond(&q, b);
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    use bondline::peridynamics::BoxCell;
+
+    use super::*;
+
+    fn hexahedron(cell: &BoxCell<3>, map: impl Fn(Vector<3>) -> Vector<3>) -> Hexahedron {
+        let (l, h) = cell.corners();
+        let corner = |x: f64, y: f64, z: f64| map(Vector::<3>::new(x, y, z));
+        Hexahedron::new([
+            corner(l.x, l.y, l.z),
+            corner(h.x, l.y, l.z),
+            corner(h.x, h.y, l.z),
+            corner(l.x, h.y, l.z),
+            corner(l.x, l.y, h.z),
+            corner(h.x, l.y, h.z),
+            corner(h.x, h.y, h.z),
+            corner(l.x, h.y, h.z),
+        ])
+        .unwrap()
+    }
+
+    #[test]
+    fn a_turned_box_has_the_same_volume_in_the_ball() {
+        let (c, s) = (0.8, 0.6);
+        let turn = |x: Vector<3>| {
+            let y = Vector::<3>::new(c * x.x - s * x.y, s * x.x + c * x.y, x.z);
+            Vector::<3>::new(y.x, c * y.y - s * y.z, s * y.y + c * y.z)
+        };
+        let cell = BoxCell::new(
+            Vector::<3>::new(0.5, -0.3, 0.2),
+            Vector::<3>::new(1.0, 0.5, 0.6),
+        )
+        .unwrap();
+        let exact = cell.ball_measure(&Vector::zeros(), 0.9);
+        let measured = hexahedron(&cell, turn).ball_volume(&Vector::zeros(), 0.9);
+        assert!((measured - exact).abs() < 1e-14, "{measured} {exact}");
+        // the ball inside, around, beyond, and a centre on a face's plane and on a corner
+        for (centre, radius) in [
+            (Vector::<3>::new(0.75, 0.1, 0.4), 0.1),
+            (Vector::<3>::new(0.7, 0.1, 0.4), 3.0),
+            (Vector::<3>::new(3.0, 0.1, 0.4), 0.5),
+            (Vector::<3>::new(0.5, 0.1, 0.4), 0.3),
+            (Vector::<3>::new(0.5, -0.3, 0.2), 0.45),
+            (Vector::<3>::new(0.2, -0.3, 0.2), 0.45),
+        ] {
+            let exact = cell.ball_measure(&centre, radius);
+            let straight = hexahedron(&cell, |x| x).ball_volume(&centre, radius);
+            let turned = hexahedron(&cell, turn).ball_volume(&turn(centre), radius);
+            assert!(
+                (straight - exact).abs() < 1e-14,
+                "{centre} {radius}: {straight} {exact}"
+            );
+            assert!(
+                (turned - exact).abs() < 1e-13,
+                "{centre} {radius}: {turned} {exact}"
+            );
+        }
+    }
+
+    #[test]
+    fn skewed_hexahedra_that_fill_a_box_fill_the_ball() {
+        // eight hexahedra about a middle point that is moved off the middle: their faces are not plane
+        let grid = [-1.0, 0.0, 1.0];
+        let moved = |x: Vector<3>| {
+            let inner = (1.0 - x.x * x.x) * (1.0 - x.y * x.y) * (1.0 - x.z * x.z);
+            let face = |a: f64, b: f64| (1.0 - a * a) * (1.0 - b * b);
+            x + Vector::<3>::new(0.15 * inner, -0.1 * face(x.y, x.x) * inner, 0.12 * inner)
+                + Vector::<3>::new(0.1 * face(x.x, x.y), 0.1 * face(x.y, x.z), 0.0)
+        };
+        let mut sum = 0.0;
+        let mut whole = 0.0;
+        for i in 0..2 {
+            for j in 0..2 {
+                for k in 0..2 {
+                    let low = Vector::<3>::new(grid[i], grid[j], grid[k]);
+                    let cell = BoxCell::new(low, low.add_scalar(1.0)).unwrap();
+                    let hexahedron = hexahedron(&cell, moved);
+                    whole += hexahedron.volume();
+                    sum += hexahedron.ball_volume(&Vector::<3>::new(0.05, 0.02, -0.03), 0.6);
+                }
+            }
+        }
+        assert!((whole - 8.0).abs() < 1e-13, "{whole}");
+        let ball = 4.0 / 3.0 * std::f64::consts::PI * 0.6f64.powi(3);
+        assert!((sum / ball - 1.0).abs() < 1e-13, "{sum}");
+    }
+
+    #[test]
+    fn a_hexahedron_without_volume_is_none() {
+        assert!(Hexahedron::new([Vector::zeros(); 8]).is_none());
+    }
 }
