@@ -175,14 +175,14 @@ pub fn fit<const D: usize>(
 }
 
 /// Degree of a least-squares fit.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[schemars(rename = "InterfaceSpec")]
 pub enum FitDegree {
-    /// Reproduces affine fields.
+    /// Affine fields pass exactly.
     Affine,
-    /// Reproduces quadratic fields, as in the report.
+    /// Quadratic fields pass exactly.
+    #[default]
     Quadratic,
 }
 

@@ -12,7 +12,6 @@ use super::motion::{self, RunOptions};
 use super::placed_scene::PlacedScene;
 use super::statics;
 use super::zone_placement::{self};
-use crate::material::Kinematics;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::pieces::agreed;
 use crate::observe::summary::{Decision, RunSummary};
@@ -21,19 +20,17 @@ use crate::scene::draft::Draft;
 use crate::scene::expression::Expression;
 use crate::scene::rim;
 use crate::scene::source::read;
-use crate::scene::spec::KinematicsSpec;
 use crate::scene::{Scene, SceneError, SceneErrorKind, SceneSpec, Solve, Source};
 use crate::system::Ranks;
 
 /// Validates a scene and places its zone, if it leaves that to the program.
 fn placed<const D: usize>(
     spec: &SceneSpec,
-    kinematics: Kinematics,
     directory: &Path,
     name: &str,
     fingerprint: Fingerprint,
 ) -> Result<Box<PlacedScene<D>>, SceneError> {
-    let draft = Draft::new(spec, kinematics, directory, name, fingerprint)?;
+    let draft = Draft::new(spec, directory, name, fingerprint)?;
     let Some(found) = zone_placement::placed(&draft)? else {
         return Ok(Box::new(rim::scene(&draft, None)?.into()));
     };
@@ -133,19 +130,10 @@ impl AnyScene {
         let spec = SceneSpec::parse(source)?;
         known_fields(&spec).map_err(|error| error.shown_in(source))?;
         let print = source.fingerprint()?;
-        let found = match spec.kinematics.get_ref() {
-            KinematicsSpec::Bar => {
-                placed(&spec, Kinematics::Bar, directory, name, print).map(Self::Bar)
-            }
-            KinematicsSpec::PlaneStress => {
-                placed(&spec, Kinematics::PlaneStress, directory, name, print).map(Self::Plane)
-            }
-            KinematicsSpec::PlaneStrain => {
-                placed(&spec, Kinematics::PlaneStrain, directory, name, print).map(Self::Plane)
-            }
-            KinematicsSpec::Solid => {
-                placed(&spec, Kinematics::Solid, directory, name, print).map(Self::Solid)
-            }
+        let found = match spec.dimension() {
+            1 => placed(&spec, directory, name, print).map(Self::Bar),
+            2 => placed(&spec, directory, name, print).map(Self::Plane),
+            _ => placed(&spec, directory, name, print).map(Self::Solid),
         };
         found.map_err(|error| error.shown_in(source))
     }

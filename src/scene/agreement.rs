@@ -4,14 +4,14 @@ use super::error::{SceneError, SceneErrorKind};
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
 use super::solve::Solve;
-use super::spec::{CouplingSpec, CutBondsSpec, ElementsSpec, SceneSpec, SolveSpec, ZonesNeeded};
+use super::spec::{CouplingSpec, ElementsSpec, SceneSpec, SolveSpec, ZonesNeeded};
+use crate::coupling::truncated::CutBonds;
 use crate::fem::{CellBandError, banded_law, crack_band};
 use crate::mesh::Mesh;
-use crate::model::Zone;
+use crate::model::{PointSource, Zone};
 use crate::observe::report::number;
 use crate::peridynamics::ZeroEnergyControl;
 use crate::peridynamics::failure::Fracture;
-use crate::scene::points::Points;
 
 /// Refuses a law that is not linear where rows at the seam would not balance it: those of splice, blending, balanced and partial stress hold a uniform strain whatever stress the two sides have.
 pub(crate) fn balanced_seam<const D: usize>(
@@ -78,7 +78,7 @@ pub(crate) fn cut_bonds<const D: usize>(
     let (CouplingSpec::Truncated(typed), Some(named)) = (coupling, &spec.coupling) else {
         return Ok(());
     };
-    if typed.cut_bonds == Some(CutBondsSpec::Breaking)
+    if typed.cut_bonds == Some(CutBonds::Breaking)
         && !material.fracture.is_none_or(Fracture::is_of_stretch)
     {
         return Err(SceneError::new(
@@ -340,13 +340,13 @@ pub(crate) fn horizon<const D: usize>(
         let x = mesh.centroid(c);
         let delta = p.horizon_at(&x);
         let spacing = match &p.points {
-            Points::Lattice { spacing, .. } => *spacing,
+            PointSource::Lattice { spacing, .. } => *spacing,
             // checked body by body
-            Points::Lattices { .. } => continue,
-            Points::Cells if zones[c] == Zone::Nonlocal => {
+            PointSource::Lattices { .. } => continue,
+            PointSource::Cells if zones[c] == Zone::Nonlocal => {
                 mesh.cell_volume(c).abs().powf(1.0 / D as f64)
             }
-            Points::Cells => 0.0,
+            PointSource::Cells => 0.0,
         };
         if delta.is_finite() && delta > 0.0 && delta >= spacing * (1.0 - 1e-9) {
             continue;
@@ -371,7 +371,7 @@ pub(crate) fn horizon<const D: usize>(
         .help(if delta.is_finite() && delta > 0.0 {
             let third = number(delta / 3.0);
             let points = match &p.points {
-                Points::Cells => format!("refine the mesh there, or use points.lattice = {{ spacing = {third} }}, a third of the horizon"),
+                PointSource::Cells => format!("refine the mesh there, or use points.lattice = {{ spacing = {third} }}, a third of the horizon"),
                 _ => format!("use a spacing of {third}, a third of the horizon, or less"),
             };
             format!("{points}; or a horizon of {} to {}, three to six spacings", number(3.0 * spacing), number(6.0 * spacing))

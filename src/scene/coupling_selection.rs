@@ -12,12 +12,12 @@ use super::selected_coupling::SelectedCoupling;
 use super::source::Span;
 use super::spec::{
     CouplingSpec, ElementsSpec, LocalSpec, NonlocalSpec, PeridynamicsSpec, PointsSpec, SceneSpec,
-    SpliceSpec, TruncatedSpec, WeightsSpec,
+    SpliceSpec, TruncatedSpec,
 };
 use super::zones::{self, Placed};
 use crate::mesh::Mesh;
-use crate::model::Zone;
-use crate::scene::points::Points;
+use crate::model::{PointSource, Zone};
+use crate::peridynamics::BondWeights;
 use crate::tensor::Vector;
 
 /// Distance, in spacings, by which faces may deviate from the lattice.
@@ -163,7 +163,7 @@ fn obstacle<const D: usize>(
     if matches!(p.points, Some(PointsSpec::Cells)) {
         return certain("points that are no lattice");
     }
-    if p.weights == WeightsSpec::Fitted {
+    if p.weights == BondWeights::Fitted {
         return certain("weights that are fitted family by family");
     }
     if p.horizon_varies() {
@@ -175,7 +175,7 @@ fn obstacle<const D: usize>(
         return certain("points of several materials in space, or of a law with dilatations");
     }
     let lattice = peridynamics::peridynamics(p, truncated.traits.lattice, mesh, &zones)?;
-    let Points::Lattice { spacing, origin } = lattice.points else {
+    let PointSource::Lattice { spacing, origin } = lattice.points else {
         return certain("points that are no lattice");
     };
     if let Some(reason) = doubt {

@@ -18,7 +18,7 @@ use super::meshing;
 use super::peridynamics::{self, Peridynamics};
 use super::solve::Solve;
 use super::spec::{
-    BondsSpec, CouplingSpec, ElementsSpec, InfluenceSpec, MaterialSpec, SceneSpec, ZonesNeeded,
+    CouplingSpec, ElementsSpec, InfluenceSpec, MaterialSpec, SceneSpec, ZonesNeeded,
 };
 use super::table_rows;
 use super::temperature::{self, Temperature};
@@ -32,12 +32,12 @@ use super::{
 };
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
-use crate::model::Zone;
+use crate::model::{PointSource, Zone};
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::report::{components, number};
 use crate::observe::summary::Decision;
+use crate::peridynamics::bond_force::BondKinematics;
 use crate::peridynamics::{Influence, Law};
-use crate::scene::points::Points;
 use crate::scene::selected_coupling::SelectedCoupling;
 
 /// A scene that is validated but for its nonlocal zone, and for what follows from that.
@@ -67,11 +67,11 @@ impl<'a, const D: usize> Draft<'a, D> {
     /// A [`SceneError`] with place, value and remedy.
     pub fn new(
         spec: &'a SceneSpec,
-        kinematics: Kinematics,
         directory: &Path,
         name: &'a str,
         mut fingerprint: Fingerprint,
     ) -> Result<Self, SceneError> {
+        let kinematics = *spec.kinematics.get_ref();
         let solver = solver(spec)?;
         table_rows::read_files(&spec.tables, directory, &mut fingerprint)?;
         let mesh = meshing::build::<D>(&spec.mesh, directory, &spec.kinematics.span())?;
@@ -247,7 +247,7 @@ impl<'a, const D: usize> Draft<'a, D> {
         coupling: &CouplingSpec,
         used: &[u16],
         law: &dyn Law<D>,
-        bonds: BondsSpec,
+        bonds: BondKinematics,
     ) -> Result<ElementsSpec, SceneError> {
         elements::elements(self.spec, coupling, (&self.materials, used), law, bonds)
     }
@@ -378,7 +378,7 @@ fn horizon_choice<const D: usize>(p: &Peridynamics<D>) -> Option<Decision> {
 
 /// Says where points lie that the scene does not place.
 fn points_choice<const D: usize>(p: &Peridynamics<D>) -> Option<Decision> {
-    let Points::Lattice { spacing, origin } = &p.points else {
+    let PointSource::Lattice { spacing, origin } = &p.points else {
         return None;
     };
     Some(Decision {

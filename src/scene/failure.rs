@@ -5,21 +5,19 @@ use super::error::{SceneError, SceneErrorKind};
 use super::material_interfaces::MaterialInterface;
 use super::materials::Material;
 use super::region::{Region, region};
-use super::spec::{
-    BondsSpec, CalibrationSpec, ContactSpec, EdgeSpec, PrecisionSpec, SceneSpec, SolveSpec,
-    WeightsSpec,
-};
+use super::spec::{CalibrationSpec, ContactSpec, EdgeSpec, SceneSpec, SolveSpec};
 use crate::mesh::Mesh;
-use crate::peridynamics::bond_force::BondSoftening;
+use crate::peridynamics::BondWeights;
+use crate::peridynamics::bond_force::{BondKinematics, BondSoftening, Storage};
 use crate::peridynamics::failure::Fracture;
 
 /// Deformation and fracture of bonds, and contact. A scene that names neither fracture nor contact has none, and pays for none.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Breaking<const D: usize> {
     /// Dependence of the bond force on the displacement.
-    pub bonds: BondsSpec,
+    pub bonds: BondKinematics,
     /// Storage of the weights of bonds in scenes in time and load steps.
-    pub precision: PrecisionSpec,
+    pub precision: Storage,
     /// Fracture criterion of the peridynamic material, or else of an interface, if there is one.
     pub fracture: Option<Fracture>,
     /// Fracture criteria of each material and of the interfaces, where points have several materials.
@@ -111,12 +109,12 @@ fn bonds_of<const D: usize>(
     material: &Material<D>,
     breaks: bool,
     is_static: bool,
-) -> Result<BondsSpec, SceneError> {
+) -> Result<BondKinematics, SceneError> {
     let typed = spec.peridynamics.as_ref().and_then(|p| p.bonds.as_ref());
     let is_objective = (material.law.force_state()).is_some_and(|f| f.is_objective());
     Ok(match typed {
         Some(bonds) => {
-            if *bonds.get_ref() == BondsSpec::Exact && !is_objective {
+            if *bonds.get_ref() == BondKinematics::Exact && !is_objective {
                 return Err(SceneError::new(
                     SceneErrorKind::Conflict,
                     format!(
@@ -135,9 +133,9 @@ fn bonds_of<const D: usize>(
         }
         // nothing breaks where nothing moves, and a law for small strains stays linear
         None if !is_static && is_objective && (breaks || spec.contact.is_some()) => {
-            BondsSpec::Exact
+            BondKinematics::Exact
         }
-        None => BondsSpec::Linear,
+        None => BondKinematics::Linear,
     })
 }
 
@@ -207,7 +205,7 @@ fn softening_of<const D: usize>(
         ),
         (spec.temperature.is_some(), "their temperature changes"),
         (
-            weights == Some(WeightsSpec::Fitted),
+            weights == Some(BondWeights::Fitted),
             "their weights are fitted, and differ between their ends",
         ),
     ];
@@ -295,7 +293,7 @@ pub(crate) fn breaking<const D: usize>(
     }
     Ok(Breaking {
         bonds,
-        precision: precision.map_or(PrecisionSpec::Double, |p| *p.get_ref()),
+        precision: precision.map_or(Storage::Double, |p| *p.get_ref()),
         fracture,
         several: (used.len() > 1).then(|| FractureOfMaterials {
             of: materials

@@ -8,8 +8,7 @@ use super::region;
 use super::spec::{BodySpec, CouplingTraits, LatticeStart, SceneSpec};
 use super::value::Text;
 use crate::mesh::Mesh;
-use crate::model::{Lattice, Zone};
-use crate::scene::points::Points;
+use crate::model::{Lattice, PointSource, Zone};
 
 /// The cells, the spacing and the horizon of a body.
 fn body_region<const D: usize>(
@@ -81,7 +80,8 @@ pub(crate) fn bodies<const D: usize>(
         .label(first.span.clone(), "has a horizon of its own")
         .help("use coupling = \"truncated\", or a horizon in x, y, z"));
     }
-    let (Points::Lattice { spacing, origin }, Some(horizon)) = (&p.points, p.horizon.as_constant())
+    let (PointSource::Lattice { spacing, origin }, Some(horizon)) =
+        (&p.points, p.horizon.as_constant())
     else {
         return Err(SceneError::new(
             SceneErrorKind::Conflict,
@@ -121,7 +121,7 @@ pub(crate) fn bodies<const D: usize>(
     add_layers(mesh, zones, &of_cell);
     refuse_empty_zones(spec, first, mesh, zones, &of_cell)?;
     Ok(Peridynamics {
-        points: Points::Lattices { lattices, of_cell },
+        points: PointSource::Lattices { lattices, of_cell },
         ..p
     })
 }

@@ -8,13 +8,12 @@ use super::error::{SceneError, SceneErrorKind};
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
 use super::source::Span;
-use super::spec::{CouplingSpec, MaterialInterfaceSpec, SceneSpec, StiffnessSpec};
+use super::spec::{CouplingSpec, MaterialInterfaceSpec, SceneSpec};
 use super::value::Text;
-use crate::model::Zone;
+use crate::model::{PointSource, Zone};
 use crate::observe::summary::Decision;
 use crate::peridynamics::failure::{self, Fracture};
 use crate::peridynamics::{Law, Several, StiffnessMean};
-use crate::scene::points::Points;
 
 /// Bonds between two materials, as a scene types them.
 #[derive(Clone, Debug, PartialEq)]
@@ -121,10 +120,7 @@ fn interface<const D: usize>(
     Ok(MaterialInterface {
         name: name.value.clone(),
         between: [a.min(b), a.max(b)],
-        mean: match typed.stiffness.as_ref().map(|s| *s.get_ref()) {
-            None | Some(StiffnessSpec::HarmonicMean) => StiffnessMean::Harmonic,
-            Some(StiffnessSpec::ArithmeticMean) => StiffnessMean::Arithmetic,
-        },
+        mean: (typed.stiffness.as_ref()).map_or(StiffnessMean::Harmonic, |s| *s.get_ref()),
         fracture: fracture(name, typed, law.as_ref())?,
     })
 }
@@ -398,7 +394,7 @@ pub(crate) fn check<const D: usize>(
         ));
     }
     let Some(p) = p else { return Ok(()) };
-    if matches!(p.points, Points::Lattices { .. }) {
+    if matches!(p.points, PointSource::Lattices { .. }) {
         return Err(pair.refused(
             "`zones.bodies` is set",
             "another, and each body has a lattice of one",

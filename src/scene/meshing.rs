@@ -9,13 +9,11 @@ use super::bounds_checks;
 use super::error::{SceneError, SceneErrorKind, closest};
 use super::region::{corners, position};
 use super::source::Span;
-use super::spec::{
-    AxisSpec, CutoutSpec, FileMeshSpec, FileOrderSpec, MeshSpec, PlaneCellSpec, SolidCellSpec,
-};
+use super::spec::{AxisSpec, CutoutSpec, FileMeshSpec, MeshSpec, PlaneCellSpec, SolidCellSpec};
 use super::value::{Coordinates, Text};
 use crate::fem;
 use crate::mesh::generate::{Axis, CutOut, Grid, SIDES};
-use crate::mesh::{Mesh, MeshError, Order, quality, read};
+use crate::mesh::{Mesh, MeshError, quality, read};
 use crate::observe::checkpoint::Fingerprint;
 
 /// The most cells that a generated mesh may have: beyond it a typing error is likelier than a wish.
@@ -36,17 +34,13 @@ fn from_file<const D: usize>(file: &FileMeshSpec, directory: &Path) -> Result<Me
             _ => told,
         }
     };
-    let order = match file.order {
-        FileOrderSpec::Kept => Order::Kept,
-        FileOrderSpec::Linear => Order::Linear,
-    };
     let mesh: Mesh<D> = match &file.held {
-        Some(parts) => parts.mesh_of(order).map_err(|error| {
+        Some(parts) => parts.mesh_of(file.order).map_err(|error| {
             SceneError::new(SceneErrorKind::Mesh, format!("`mesh`: {error}"))
                 .help("the scene was given this mesh in memory")
         })?,
         None => {
-            let mesh = read::read_of(&path, order).map_err(failed)?;
+            let mesh = read::read_of(&path, file.order).map_err(failed)?;
             quality::check(&mesh).map_err(failed)?;
             mesh
         }

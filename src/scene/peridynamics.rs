@@ -1,21 +1,19 @@
 //! The peridynamic choices of a validated scene: horizon, points, weights, influence function, partial volumes.
 
+use toml::Spanned;
+
 use super::bounds_checks;
 use super::default_horizon::horizon_of;
 use super::default_points::default_points;
 use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
-use super::points::Points;
 use super::region::position;
 use super::solve;
-use super::spec::{
-    InfluenceSpec, LatticeStart, PeridynamicsSpec, PointsSpec, SurfacesSpec, VolumesSpec,
-    WeightsSpec,
-};
+use super::spec::{InfluenceSpec, LatticeStart, PeridynamicsSpec, PointsSpec};
 use super::value::Number;
 use crate::mesh::Mesh;
-use crate::model::Zone;
-use crate::peridynamics::{Influence, PartialVolume};
+use crate::model::{PointSource, Surfaces, Zone};
+use crate::peridynamics::{BondWeights, Influence, PartialVolume};
 use crate::tensor::{Vector, padded};
 
 /// The peridynamic choices of a scene.
@@ -26,15 +24,15 @@ pub struct Peridynamics<const D: usize> {
     /// Reason for its size, if the scene does not type it.
     pub horizon_why: Option<String>,
     /// Positions of the points.
-    pub points: Points<D>,
+    pub points: PointSource<D>,
     /// Reason for their positions, as far as the scene does not type them.
     pub points_why: Option<String>,
     /// Bond weights.
-    pub weights: WeightsSpec,
+    pub weights: BondWeights,
     /// Shares of the cells that the horizon cuts.
     pub volumes: PartialVolume,
     /// Treatment of bonds across the boundary of the mesh.
-    pub surfaces: SurfacesSpec,
+    pub surfaces: Surfaces,
 }
 
 impl<const D: usize> Peridynamics<D> {
@@ -82,7 +80,7 @@ pub(crate) fn peridynamics<const D: usize>(
             points_why = Some(why);
             points
         }
-        Some(PointsSpec::Cells) => Points::Cells,
+        Some(PointsSpec::Cells) => PointSource::Cells,
         Some(PointsSpec::Lattice(lattice)) => {
             let spacing =
                 bounds_checks::positive("peridynamics.points.lattice.spacing", &lattice.spacing)?;
@@ -114,7 +112,7 @@ pub(crate) fn peridynamics<const D: usize>(
                     origin
                 }
             };
-            Points::Lattice { spacing, origin }
+            PointSource::Lattice { spacing, origin }
         }
     };
     Ok(Peridynamics {
@@ -144,14 +142,9 @@ fn check_horizon<const D: usize>(typed: &Expression) -> Result<(), SceneError> {
 
 /// The partial volumes typed; they need to know the cells of a lattice.
 fn volumes(spec: &PeridynamicsSpec) -> Result<PartialVolume, SceneError> {
-    let Some(typed) = &spec.volumes else {
+    let is_partial = |typed: &&Spanned<PartialVolume>| *typed.get_ref() != PartialVolume::Full;
+    let Some(typed) = spec.volumes.as_ref().filter(is_partial) else {
         return Ok(PartialVolume::Full);
-    };
-    let volumes = match typed.get_ref() {
-        VolumesSpec::Full => return Ok(PartialVolume::Full),
-        VolumesSpec::Pdlammps => PartialVolume::PdLammps,
-        VolumesSpec::Hhb => PartialVolume::Hhb,
-        VolumesSpec::Exact => PartialVolume::Exact,
     };
     let conflict = |message: &str, help: &str| {
         Err(SceneError::new(SceneErrorKind::Conflict, message)
@@ -164,13 +157,13 @@ fn volumes(spec: &PeridynamicsSpec) -> Result<PartialVolume, SceneError> {
             "give peridynamics.points.lattice a spacing, or use volumes = \"full\"",
         );
     }
-    if spec.weights == WeightsSpec::Fitted {
+    if spec.weights == BondWeights::Fitted {
         return conflict(
             "`peridynamics.volumes` is partial, and the weights are fitted to full volumes",
             "use weights = \"isotropic\" or \"plain\", or volumes = \"full\"",
         );
     }
-    Ok(volumes)
+    Ok(*typed.get_ref())
 }
 
 #[cfg(test)]

@@ -23,10 +23,9 @@ use super::validated::Scene;
 use super::zones::Placed;
 use crate::fem::Locator;
 use crate::model::patch::{self, PatchError, PatchLattice, Patched, Places, Replaced};
-use crate::model::{Reach, Zone};
+use crate::model::{PointSource, Reach, Zone};
 use crate::observe::report::number;
 use crate::observe::summary::Decision;
-use crate::scene::points::Points;
 use crate::scene::solve::Solve;
 use crate::tensor::Vector;
 
@@ -77,7 +76,7 @@ fn before_others<const D: usize>(
         &draft.spec.zones,
         scene.peridynamics.as_ref().map(|p| &p.points),
     );
-    let (Some(zone), None, Some(Points::Lattice { spacing, origin })) =
+    let (Some(zone), None, Some(PointSource::Lattice { spacing, origin })) =
         (&zones.nonlocal, &zones.rim, lattice)
     else {
         return scene;
@@ -146,7 +145,7 @@ fn with_rim<const D: usize>(
             .help(help.to_owned())
     };
     let lattice = before.peridynamics.as_ref().map(|p| &p.points);
-    let Some(&Points::Lattice { spacing, origin }) = lattice else {
+    let Some(&PointSource::Lattice { spacing, origin }) = lattice else {
         return Err(conflict(
             "a rim of its own lies on a lattice, and the points are none".to_owned(),
             "use peridynamics.points.lattice, or rim = \"mesh\"",

@@ -5,9 +5,8 @@ use super::error::{SceneError, SceneErrorKind};
 use super::expression::Expression;
 use super::materials::Material;
 use super::solve::{Clock, Solve};
-use super::spec::{
-    CouplingSpec, CutBondsSpec, ElementsSpec, MaterialSpec, SceneSpec, TemperatureSpec,
-};
+use super::spec::{CouplingSpec, ElementsSpec, MaterialSpec, SceneSpec, TemperatureSpec};
+use crate::coupling::truncated::CutBonds;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
 use crate::peridynamics::laws::Named;
@@ -104,7 +103,7 @@ pub(super) fn agrees<const D: usize>(
         );
     }
     match coupling {
-        CouplingSpec::Truncated(typed) if typed.cut_bonds == Some(CutBondsSpec::Breaking) => refuse(
+        CouplingSpec::Truncated(typed) if typed.cut_bonds == Some(CutBonds::Breaking) => refuse(
             "`temperature`, and cut-bonds = \"breaking\": bonds that a seam cuts know no temperature but linear ones".to_owned(),
             "let cut-bonds = \"linear\" in [coupling.truncated], or leave it out, and keep damage two horizons away from the seam",
         ),

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use super::bounds_checks::{not_negative, positive};
 use super::error::{SceneError, SceneErrorKind};
-use super::spec::{EnergiesSpec, StrainsSpec, TangentSpec, UmatSpec};
+use super::spec::{StrainsSpec, TangentSpec, UmatSpec};
 use super::value::Text;
-use crate::material::{RoutineError, UmatEnergies, UmatSettings, routine_loader};
+use crate::material::{RoutineError, UmatSettings, routine_loader};
 use crate::observe::checkpoint::Fingerprint;
 use crate::peridynamics::Law;
 use crate::peridynamics::laws::{Constants, LocalCorrespondence};
@@ -58,10 +58,7 @@ pub(crate) fn umat<const D: usize>(
         is_thread_safe: spec.thread_safe,
         temperature: spec.temperature.as_ref().map_or(0.0, |t| t.value),
         length,
-        energies: match spec.energies {
-            EnergiesSpec::Stress => UmatEnergies::Stress,
-            EnergiesSpec::Routine => UmatEnergies::Routine,
-        },
+        energies: spec.energies,
         has_tangent: spec.tangent == TangentSpec::Routine,
         flows_at_constant_volume: spec.mean_dilatation.unwrap_or(true),
     };

@@ -24,7 +24,7 @@ use crate::run::thermal::Thermal;
 use crate::scene::failure::{Breaking, SofteningChoice};
 use crate::scene::initial::InitialKind;
 use crate::scene::region::Region;
-use crate::scene::spec::{BondsSpec, CalibrationSpec, PrecisionSpec};
+use crate::scene::spec::CalibrationSpec;
 use crate::solve::explicit::State;
 use crate::system::{LinearMotion, Ranks, SemiDiscrete};
 use crate::tensor::Vector;
@@ -76,7 +76,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
         BondKinematics::Exact => "geometrically exact bonds",
         BondKinematics::Linear => "bonds linear in the displacement",
     };
-    let storage = storage(breaking.precision);
+    let storage = breaking.precision;
     let breaks = failure_text(model, failure.as_ref(), breaking);
     let by_state = matches!(failure, Some(BondThreshold::State(_)));
     let can_fail_nowhere = |x: &_| breaking.no_fail.iter().any(|r| r.contains(x, 0.0));
@@ -150,7 +150,7 @@ fn is_linear<const D: usize>(
     let breaking = &rest.breaking;
     failure.is_none()
         && breaking.contact.is_none()
-        && breaking.bonds == BondsSpec::Linear
+        && breaking.bonds == BondKinematics::Linear
         && (model.peridynamics.as_ref()).is_none_or(|p| p.law.is_linear())
         && !rest.has_nonlinear_elements(model)
 }
@@ -163,14 +163,6 @@ fn sharing_steps<const D: usize>(
     match sharing {
         Sharing::Nothing => motion,
         Sharing::Steps | Sharing::Families => motion.with_shared_steps(),
-    }
-}
-
-/// Returns the storage of the weights of bonds.
-fn storage(precision: PrecisionSpec) -> Storage {
-    match precision {
-        PrecisionSpec::Double => Storage::Double,
-        PrecisionSpec::Single => Storage::Single,
     }
 }
 

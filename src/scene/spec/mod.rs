@@ -27,9 +27,8 @@ mod table;
 mod user_material;
 
 pub use super::coupling_kinds::{
-    BalancedSpec, BetaSpec, BlendingSpec, CouplingSpec, CouplingTraits, CutBondsSpec, FormSpec,
-    InterfaceSpec, LatticeStart, LocalSpec, NonlocalSpec, PartialStressSpec, SpliceSpec,
-    TruncatedSpec, ZonesNeeded,
+    BalancedSpec, BlendingSpec, CouplingSpec, CouplingTraits, FormSpec, LatticeStart, LocalSpec,
+    NonlocalSpec, PartialStressSpec, SpliceSpec, TruncatedSpec, ZonesNeeded,
 };
 pub use condition::{TemperatureSpec, VoidSpec};
 pub use control::{
@@ -38,18 +37,16 @@ pub use control::{
 };
 pub use impactor::{CylinderSpec, ImpactorMotionSpec, ImpactorSpec, PlaneSpec, SphereSpec};
 pub use influence::{InfluenceSpec, MicromodulusSpec, PolynomialSpec};
-pub use material::{
-    LatticeSpec, MaterialSpec, PeridynamicsSpec, PointsSpec, SurfacesSpec, VolumesSpec, WeightsSpec,
-};
-pub use material_interface::{MaterialInterfaceSpec, StiffnessSpec};
+pub use material::{LatticeSpec, MaterialSpec, PeridynamicsSpec, PointsSpec};
+pub use material_interface::MaterialInterfaceSpec;
 pub use mesh::{
-    AxisSpec, BoxMeshSpec, CutoutSpec, FileMeshSpec, FileOrderSpec, GradedSpec, LineMeshSpec,
-    MeshSpec, PlaneCellSpec, RectangleMeshSpec, SolidCellSpec,
+    AxisSpec, BoxMeshSpec, CutoutSpec, FileMeshSpec, GradedSpec, LineMeshSpec, MeshSpec,
+    PlaneCellSpec, RectangleMeshSpec, SolidCellSpec,
 };
 pub use motion::{
-    BeyondLimitSpec, BondsSpec, CalibrationSpec, ContactSpec, ElementsSpec, ExplicitSpec,
-    GrowingModesSpec, InitialFieldSpec, InitialSpec, LoadStepSpec, NoOptionsSpec, PrecisionSpec,
-    QuasiStaticSpec, SolveSpec, TipSpec, WhenPartedSpec,
+    BeyondLimitSpec, CalibrationSpec, ContactSpec, ElementsSpec, ExplicitSpec, GrowingModesSpec,
+    InitialFieldSpec, InitialSpec, LoadStepSpec, NoOptionsSpec, QuasiStaticSpec, SolveSpec,
+    TipSpec, WhenPartedSpec,
 };
 pub use named_law::Given;
 pub use region::{
@@ -57,7 +54,7 @@ pub use region::{
     SegmentSpec, ShapeSpec, SkinSpec, TransitionSpec, WithoutSpec, ZonesSpec,
 };
 pub use table::TableSpec;
-pub use user_material::{EnergiesSpec, StrainsSpec, TangentSpec, UmatSpec};
+pub use user_material::{StrainsSpec, TangentSpec, UmatSpec};
 
 use std::collections::BTreeMap;
 
@@ -67,6 +64,7 @@ use toml::Spanned;
 
 use super::condition_kinds::ConditionSpec;
 use super::value::{Number, Text};
+use crate::material::Kinematics;
 
 /// A scene of bondline: a body that is finite elements here and peridynamics there, at rest or in motion.
 ///
@@ -83,8 +81,8 @@ pub struct SceneSpec {
     #[serde(default)]
     pub accuracy: Option<Number>,
     /// Kinematic assumption by which the body represents a three-dimensional solid; fixes the dimension.
-    #[schemars(with = "KinematicsSpec")]
-    pub kinematics: Spanned<KinematicsSpec>,
+    #[schemars(with = "Kinematics")]
+    pub kinematics: Spanned<Kinematics>,
     /// The mesh: generated, or read from a file.
     pub mesh: MeshSpec,
     /// The materials by name. At most one of several may be without `cells`: it fills what the others leave.
@@ -145,11 +143,7 @@ pub struct SceneSpec {
 impl SceneSpec {
     /// Space dimension.
     pub fn dimension(&self) -> usize {
-        match self.kinematics.get_ref() {
-            KinematicsSpec::Bar => 1,
-            KinematicsSpec::PlaneStress | KinematicsSpec::PlaneStrain => 2,
-            KinematicsSpec::Solid => 3,
-        }
+        self.kinematics.get_ref().dimension()
     }
 }
 
@@ -169,18 +163,4 @@ fn zones_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
         "description": "Where the body is nonlocal: a table, [zones], or \"auto\" for a zone that is placed by itself.",
         "anyOf": [table, { "enum": ["auto"] }]
     })
-}
-
-/// Kinematic assumption by which a body of one, two or three dimensions represents a solid.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum KinematicsSpec {
-    /// One dimension: uniaxial stress.
-    Bar,
-    /// Two dimensions: a thin plate.
-    PlaneStress,
-    /// Two dimensions: a long body.
-    PlaneStrain,
-    /// Three dimensions.
-    Solid,
 }

@@ -172,16 +172,6 @@ pub struct InitialFieldSpec {
     pub z: Option<Expression>,
 }
 
-/// Dependence of the bond force on the displacement.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum BondsSpec {
-    /// Along the deformed bond, by its stretch.
-    Exact,
-    /// Along the undeformed bond, to first order of the displacement.
-    Linear,
-}
-
 /// Constitutive law of the finite elements of the points' materials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -191,17 +181,6 @@ pub enum ElementsSpec {
     Linear,
     /// The bonds of the lattice under the deformation of the element, at any stretch and rotation.
     CauchyBorn,
-}
-
-/// Storage of the weights of bonds in scenes in time and load steps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum PrecisionSpec {
-    /// In eight bytes, or not at all where the points fill a lattice.
-    #[default]
-    Double,
-    /// One by one, in four bytes: forces are off by about 1e-8 of themselves.
-    Single,
 }
 
 /// Calibration of the critical stretch to a fracture energy.

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::region::CellsSpec;
+use crate::material::UmatEnergies;
 use crate::scene::value::{Count, Number, Text};
 
 /// A routine of a compiled library with the calling convention of Abaqus' UMAT.
@@ -36,7 +37,7 @@ pub struct UmatSpec {
     pub strains: StrainsSpec,
     /// Source of the energies.
     #[serde(default)]
-    pub energies: EnergiesSpec,
+    pub energies: UmatEnergies,
     /// Source of the tangent of Newton's method.
     #[serde(default)]
     pub tangent: TangentSpec,
@@ -88,17 +89,6 @@ pub enum StrainsSpec {
     Small,
     /// Large ones: the rate form, with stresses turned by DROT.
     Large,
-}
-
-/// Source of the energies.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum EnergiesSpec {
-    /// The stress: stored is its elastic energy, the rest of the work is dissipated.
-    #[default]
-    Stress,
-    /// The routine: SSE, SPD and SCD.
-    Routine,
 }
 
 /// Source of the tangent of Newton's method.
