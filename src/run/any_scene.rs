@@ -68,6 +68,19 @@ pub enum AnyScene {
     Solid(Box<PlacedScene<3>>),
 }
 
+/// Evaluates an expression of the scene, whatever its dimension.
+macro_rules! each {
+    ($any:expr, $scene:ident => $then:expr) => {
+        match $any {
+            $crate::run::AnyScene::Bar($scene) => $then,
+            $crate::run::AnyScene::Plane($scene) => $then,
+            $crate::run::AnyScene::Solid($scene) => $then,
+        }
+    };
+}
+
+pub(super) use each;
+
 /// Refuses the name of a field that there is not.
 fn known_fields(spec: &SceneSpec) -> Result<(), SceneError> {
     let known = fields::asked_by("output.fields");
@@ -114,12 +127,7 @@ impl AnyScene {
 
     /// Keeps the choices made for an accuracy, to be reported with the results.
     pub fn chose(&mut self, choices: Vec<Decision>) {
-        let known = match self {
-            Self::Bar(s) => &mut s.choices,
-            Self::Plane(s) => &mut s.choices,
-            Self::Solid(s) => &mut s.choices,
-        };
-        known.splice(0..0, choices);
+        each!(self, s => drop(s.choices.splice(0..0, choices)));
     }
 
     /// Validates a scene that leaves nothing open, whether or not it has an `accuracy`.
@@ -140,41 +148,24 @@ impl AnyScene {
 
     /// The scene, if it is of `D` dimensions.
     pub fn of_dimension<const D: usize>(self) -> Option<Scene<D>> {
-        let found: Box<dyn Any> = match self {
-            Self::Bar(scene) => scene,
-            Self::Plane(scene) => scene,
-            Self::Solid(scene) => scene,
-        };
+        let found: Box<dyn Any> = each!(self, scene => scene);
         let scene = found.downcast::<PlacedScene<D>>().ok()?;
         Some(scene.scene)
     }
 
     /// Writes all files into another folder than the scene's.
     pub fn set_output_directory(&mut self, directory: PathBuf) {
-        match self {
-            Self::Bar(s) => s.output.directory = directory,
-            Self::Plane(s) => s.output.directory = directory,
-            Self::Solid(s) => s.output.directory = directory,
-        }
+        each!(self, s => s.output.directory = directory);
     }
 
     /// Returns true if the scene runs in steps, so that it can be interrupted and resumed.
     pub fn moves(&self) -> bool {
-        let solve = match self {
-            Self::Bar(s) => &s.solve,
-            Self::Plane(s) => &s.solve,
-            Self::Solid(s) => &s.solve,
-        };
-        *solve != Solve::Static
+        each!(self, s => s.solve != Solve::Static)
     }
 
     /// The horizon \[m\], typed or chosen; none without points, and of one that varies in space.
     pub fn horizon(&self) -> Option<f64> {
-        let points = match self {
-            Self::Bar(s) => s.peridynamics.as_ref().map(|p| &p.horizon),
-            Self::Plane(s) => s.peridynamics.as_ref().map(|p| &p.horizon),
-            Self::Solid(s) => s.peridynamics.as_ref().map(|p| &p.horizon),
-        };
+        let points = each!(self, s => s.peridynamics.as_ref().map(|p| &p.horizon));
         points.and_then(Expression::as_constant)
     }
 
@@ -203,30 +194,18 @@ impl AnyScene {
             self.fits()?;
         }
         let unused = self.unused().to_vec();
-        let mut summary = match self {
-            Self::Bar(s) => run(*s, options, progress),
-            Self::Plane(s) => run(*s, options, progress),
-            Self::Solid(s) => run(*s, options, progress),
-        }?;
+        let mut summary = each!(self, s => run(*s, options, progress))?;
         summary.warnings.extend(unused);
         Ok(summary)
     }
 
     /// Warnings of parts of the scene that touch nothing.
     pub fn unused(&self) -> &[String] {
-        match self {
-            Self::Bar(s) => &s.unused,
-            Self::Plane(s) => &s.unused,
-            Self::Solid(s) => &s.unused,
-        }
+        each!(self, s => &s.unused)
     }
 
     /// Refuses what needs more memory than there is, before anything of it is laid out.
     pub fn fits(&self) -> Result<(), RunError> {
-        match self {
-            Self::Bar(s) => budget::fits(s),
-            Self::Plane(s) => budget::fits(s),
-            Self::Solid(s) => budget::fits(s),
-        }
+        each!(self, s => budget::fits(s))
     }
 }

@@ -7,6 +7,7 @@ use crate::coupling::semidiscrete::masses;
 use crate::material::LocalLaw;
 use crate::progress::Silent;
 use crate::run::AnyScene;
+use crate::run::any_scene::each;
 use crate::run::error::RunError;
 use crate::scene::validated::Scene;
 use crate::system::{BlockCsr, LinearMotion};
@@ -87,11 +88,7 @@ impl AnyScene {
     /// # Errors
     /// [`RunError`] of the model or its coupling.
     pub fn linear_model(self) -> Result<LinearModel, RunError> {
-        match self {
-            Self::Bar(scene) => linear_model(scene.scene),
-            Self::Plane(scene) => linear_model(scene.scene),
-            Self::Solid(scene) => linear_model(scene.scene),
-        }
+        each!(self, scene => linear_model(scene.scene))
     }
 }
 
