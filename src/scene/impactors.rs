@@ -1,7 +1,7 @@
 //! Rigid impactors of a validated scene.
 
 use super::bounds_checks;
-use super::components::Components;
+use super::components::{Components, no_such_axis};
 use super::error::{SceneError, SceneErrorKind, quoted};
 use super::expression::Expression;
 use super::region::position;
@@ -320,12 +320,7 @@ fn components<const D: usize>(
         let Some(e) = e else { continue };
         let at = format!("{place}.{}", AXES[k]);
         if k >= D {
-            return Err(SceneError::new(
-                SceneErrorKind::Dimension,
-                format!("`{at}` in a scene of dimension {D}"),
-            )
-            .label(e.span.clone(), "no such axis")
-            .help(format!("remove `{}`", AXES[k])));
+            return Err(no_such_axis::<D>(place, k, &e.span));
         }
         if e.function().is_some() || e.depends_on_position() {
             return Err(refused(

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::components::{Components, components, finite};
+use super::components::{Components, components};
+use super::condition_at::ConditionAt;
 use super::error::{SceneError, SceneErrorKind};
 use super::places::inside;
 use super::region::Region;
@@ -76,7 +77,13 @@ pub(crate) fn initial<const D: usize>(
         let selected = region.select_nodes(mesh);
         let within = mesh.nodes.iter().zip(selected);
         let within = within.filter_map(|(x, selected)| selected.then_some(*x));
-        finite(&place, name, &components, clock, within)?;
+        let at = ConditionAt {
+            place: &place,
+            name,
+            mesh,
+            clock,
+        };
+        at.finite(&components, within)?;
         found.push(Initial {
             name: name.value.clone(),
             kind,

@@ -13,7 +13,7 @@
 //! | `coupling_selection.rs`, `selected_coupling.rs` | the coupling that is typed, or the one that suits the scene |
 //! | `coupling_kinds/` | the couplings that are typed, one file each |
 //! | `condition_kinds/` | the conditions that are typed, one file each: loads, supports, springs |
-//! | `conditions.rs`, `load.rs`, `condition_list.rs` | a condition; a load, where it acts and its density; all conditions together |
+//! | `conditions.rs`, `load.rs`, `condition_at.rs`, `condition_list.rs` | a condition; a load, where it acts and its density; where a condition is read; all conditions together |
 //! | `components.rs`, `places.rs` | vector fields, and the sets and shapes that conditions name |
 //! | `temperature.rs` | the temperature of the body |
 //! | `impactors.rs` | rigid bodies that strike or press |
@@ -31,6 +31,7 @@ pub(crate) mod agreement;
 pub(crate) mod bounds_checks;
 pub mod build;
 pub(crate) mod components;
+mod condition_at;
 pub mod condition_kinds;
 mod condition_list;
 pub(crate) mod conditions;

@@ -4,14 +4,12 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::ConditionKind;
-use crate::mesh::Mesh;
-use crate::scene::components::{Components, finite};
+use crate::scene::components::Components;
+use crate::scene::condition_at::ConditionAt;
 use crate::scene::conditions::{Condition, Prescribed};
 use crate::scene::error::{SceneError, SceneErrorKind};
 use crate::scene::expression::Expression;
-use crate::scene::places::support;
 use crate::scene::region::position;
-use crate::scene::solve::Clock;
 use crate::scene::spec::ShapeSpec;
 use crate::scene::value::{Coordinates, Text};
 use crate::tensor::{Tensor, Vector};
@@ -38,13 +36,8 @@ pub struct RotationSpec {
 }
 
 impl ConditionKind for RotationSpec {
-    fn build<const D: usize>(
-        &self,
-        place: &str,
-        name: &Text,
-        mesh: &Mesh<D>,
-        clock: Clock,
-    ) -> Result<Condition<D>, SceneError> {
+    fn build<const D: usize>(&self, at: &ConditionAt<'_, D>) -> Result<Condition<D>, SceneError> {
+        let (place, name) = (at.place, at.name);
         if D == 1 {
             return Err(SceneError::new(
                 SceneErrorKind::Dimension,
@@ -53,12 +46,12 @@ impl ConditionKind for RotationSpec {
             .label(name.span.clone(), "a bar does not rotate")
             .help("prescribe a displacement"));
         }
-        let at = format!("{place}.angle");
-        clock.admits(&at, &self.angle)?;
+        let angle = format!("{place}.angle");
+        at.clock.admits(&angle, &self.angle)?;
         if self.angle.depends_on_position() {
             return Err(SceneError::new(
                 SceneErrorKind::Conflict,
-                format!("`{at}` depends on position"),
+                format!("`{angle}` depends on position"),
             )
             .label(self.angle.span.clone(), "not a rigid rotation")
             .help("let the angle be a number or depend on t only"));
@@ -66,14 +59,10 @@ impl ConditionKind for RotationSpec {
         let centre = position::<D>(&format!("{place}.center"), &self.center)?;
         let axis = axis::<D>(place, name, self)?;
         let components = rotated(&axis, &centre, &self.angle);
-        let support = support(place, name, self.on.as_ref(), self.inside.as_ref(), mesh)?;
-        let nodes = mesh.nodes.iter().copied().take(1);
-        finite(place, name, &components, clock, nodes)?;
-        Ok(Condition {
-            name: name.value.clone(),
-            prescribed: Prescribed::Displacement(support),
-            components,
-        })
+        let support = at.support(self.on.as_ref(), self.inside.as_ref())?;
+        let nodes = at.mesh.nodes.iter().copied().take(1);
+        at.finite(&components, nodes)?;
+        Ok(at.prescribes(Prescribed::Displacement(support), components))
     }
 }
 

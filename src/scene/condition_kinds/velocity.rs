@@ -4,12 +4,12 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{ConditionKind, displacement::held};
-use crate::mesh::Mesh;
-use crate::scene::components::{Components, components_in};
+use crate::scene::components::Components;
+use crate::scene::condition_at::ConditionAt;
 use crate::scene::conditions::{Condition, Prescribed};
 use crate::scene::error::{SceneError, SceneErrorKind};
 use crate::scene::expression::Expression;
-use crate::scene::solve::{Clock, Pacing};
+use crate::scene::solve::Pacing;
 use crate::scene::spec::ShapeSpec;
 use crate::scene::value::Text;
 
@@ -35,38 +35,26 @@ pub struct VelocitySpec {
 }
 
 impl ConditionKind for VelocitySpec {
-    fn build<const D: usize>(
-        &self,
-        place: &str,
-        name: &Text,
-        mesh: &Mesh<D>,
-        clock: Clock,
-    ) -> Result<Condition<D>, SceneError> {
-        let components = components_in(place, name, [&self.x, &self.y, &self.z], clock)?;
-        moves(place, name, &components, clock)?;
-        let at = (self.on.as_ref(), self.inside.as_ref());
-        let support = held(place, name, at, &components, mesh, clock)?;
-        Ok(Condition {
-            name: name.value.clone(),
-            prescribed: Prescribed::Velocity(support),
-            components,
-        })
+    fn build<const D: usize>(&self, at: &ConditionAt<'_, D>) -> Result<Condition<D>, SceneError> {
+        let components = at.components([&self.x, &self.y, &self.z])?;
+        moves(at, &components)?;
+        let support = held(at, (self.on.as_ref(), self.inside.as_ref()), &components)?;
+        Ok(at.prescribes(Prescribed::Velocity(support), components))
     }
 }
 
 /// Checks that a velocity is one that a run can follow.
 fn moves<const D: usize>(
-    place: &str,
-    name: &Text,
+    at: &ConditionAt<'_, D>,
     components: &Components<D>,
-    clock: Clock,
 ) -> Result<(), SceneError> {
-    if clock.pacing != Pacing::Moving {
+    let place = at.place;
+    if at.clock.pacing != Pacing::Moving {
         return Err(SceneError::new(
             SceneErrorKind::Conflict,
             format!("`{place}` in a scene that does not move"),
         )
-        .label(name.span.clone(), "a velocity")
+        .label(at.name.span.clone(), "a velocity")
         .help("add [solve.explicit] with duration = ..., or prescribe a displacement"));
     }
     match components
