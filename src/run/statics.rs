@@ -35,7 +35,7 @@ use crate::system::{Ranks, SemiDiscrete};
 use crate::tensor::Vector;
 use crate::{
     coupling::{Coupling, Operator, Problem},
-    model::{Model, SiteKind},
+    model::Model,
 };
 
 /// Solves a static scene and writes its outputs.
@@ -412,19 +412,11 @@ impl<const D: usize> StaticBody<'_, D> {
 
     /// Sizes of a model with so many nodes and cells.
     fn sizes(&self, [nodes, cells]: [usize; 2], info: &StaticInfo) -> Sizes {
-        let model = self.model;
         Sizes {
             nodes,
             cells,
-            sites: model.sites.len(),
-            points: model
-                .sites
-                .iter()
-                .filter(|s| matches!(s.kind, SiteKind::Point(_)))
-                .count(),
-            bonds: model.bond_count() + self.operator.additional_bonds(),
-            dofs: model.sites.len() * D,
             nonzeros: info.matrix_nnz,
+            ..motion::explicit::sizes(self.model, self.operator)
         }
     }
 

@@ -9,8 +9,8 @@ use super::RunOptions;
 use super::breaks::{Breaks, breaks, damage_at_edge};
 use super::created_energy::{created_energy, set_free};
 use super::doubtful_equilibria::DoubtfulEquilibria;
-use super::dynamic_system::{failing_stretch, plane_energy, start};
-use super::explicit::{cracks, inelastic_energy, sizes};
+use super::dynamic_system::{failing_stretch, start};
+use super::explicit::{end_of_steps, sizes};
 use super::guard::energies_are_apart;
 use super::impact::{BodyOnly, impacted};
 use super::impact_record::ImpactRecord;
@@ -509,36 +509,18 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         seconds: f64,
     ) -> Result<RunSummary, RunError> {
         let (model, state) = (self.model, &self.state);
-        let stored = system.stored_energy(&state.u);
         let (_, applied) = loads::loads(model, &self.rest.conditions, state.time)?;
-        let plane = plane_energy(model, self.rest)?;
+        let of = (self.breaks, self.edge, self.pace);
+        let now = (state, system, 0.0);
+        let summary = end_of_steps((model, self.rest), &self.recorder, now, of)?;
         let motion = MotionSummary {
             ended: self.ended,
-            steps: state.step,
             of_steps: match self.spec.accuracy {
                 None => self.pace.steps,
                 Some(_) => state.step,
             },
-            time: state.time,
-            step: self.pace.step,
-            stable_step: None,
-            kinetic_energy: 0.0,
-            stored_energy: stored,
-            external_work: state.work,
-            missing_energy: self.recorder.energy_at_start + state.work - stored,
-            energy_gain: None,
-            cracks: cracks(system, self.breaks, plane),
-            inelastic_energy: inelastic_energy(system),
-            impactors: (self.recorder.impact.as_ref()).map_or(Vec::new(), |i| i.summary(state)),
-            broken_bonds: state.broken,
-            edge_reached: self.edge.map(|e| {
-                let x = model.sites[e.site as usize].position;
-                (e.time, x.iter().copied().collect())
-            }),
             steps_per_second: (state.step - first) as f64 / seconds.max(f64::MIN_POSITIVE),
-            switches: Vec::new(),
-            nonlocal_share: [0.0; 3],
-            processes: Vec::new(),
+            ..summary
         };
         let warnings = without_response(system, &state.u).into_iter();
         let horizon = model

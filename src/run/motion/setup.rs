@@ -65,6 +65,13 @@ pub(crate) struct RunSetup {
     pub watch: Stopwatch,
 }
 
+impl RunSetup {
+    /// Adds the seconds since the last lap to a stage.
+    pub fn lap(&mut self, stage: &str) {
+        self.watch.lap(&mut self.timings, stage);
+    }
+}
+
 /// Takes a scene apart.
 pub(crate) fn begun<const D: usize>(scene: Scene<D>) -> (RunSetup, Problem<D>, RunSettings<D>) {
     let watch = Stopwatch::start();
