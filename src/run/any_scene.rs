@@ -20,7 +20,7 @@ use crate::scene::draft::Draft;
 use crate::scene::expression::Expression;
 use crate::scene::rim;
 use crate::scene::source::read;
-use crate::scene::{Scene, SceneError, SceneErrorKind, SceneSpec, Solve, Source};
+use crate::scene::{Scene, SceneError, SceneSpec, Solve, Source};
 use crate::system::Ranks;
 
 /// Validates a scene and places its zone, if it leaves that to the program.
@@ -88,15 +88,12 @@ fn known_fields(spec: &SceneSpec) -> Result<(), SceneError> {
     let Some(name) = spec.output.fields.iter().find(unknown) else {
         return Ok(());
     };
-    Err(SceneError::new(
-        SceneErrorKind::WrongValue,
-        format!("`output.fields` names `{name}`, which is no field to ask for"),
-    )
-    .label(name.span.clone(), "not known")
-    .help(format!(
-        "known are {}; `bondline fields` lists all, and the keys of those that have one of their own",
-        known.join(", ")
-    )))
+    Err(SceneError::wrong_value(format!("`output.fields` names `{name}`, which is no field to ask for"))
+        .label(name.span.clone(), "not known")
+        .help(format!(
+            "known are {}; `bondline fields` lists all, and the keys of those that have one of their own",
+            known.join(", ")
+        )))
 }
 
 impl AnyScene {
@@ -115,12 +112,9 @@ impl AnyScene {
     /// A [`SceneError`] with place, value and remedy; for a scene with an `accuracy`, which `bondline_study::from_source` takes.
     pub fn from_source(source: &Source, directory: &Path, name: &str) -> Result<Self, SceneError> {
         if source.table()?.contains_key("accuracy") {
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                "`accuracy` leaves open what only trial runs of the scene can choose",
-            )
-            .help("load it by `bondline_study::load`, which makes them; or type mesh, horizon and points, and leave `accuracy` out")
-            .shown_in(source));
+            return Err(SceneError::conflict("`accuracy` leaves open what only trial runs of the scene can choose")
+                .help("load it by `bondline_study::load`, which makes them; or type mesh, horizon and points, and leave `accuracy` out")
+                .shown_in(source));
         }
         Self::complete(source, directory, name)
     }

@@ -1,7 +1,7 @@
 //! A nonlocal zone that follows the crack: its settings, and the scenes that cannot have it.
 
 use super::bounds_checks;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::failure::Breaking;
 use super::peridynamics::Peridynamics;
 use super::solve::Solve;
@@ -54,7 +54,7 @@ fn supported<'a, const D: usize>(
     bonds: Option<(&'a Peridynamics<D>, &'a dyn Law<D>)>,
 ) -> Result<(&'a Peridynamics<D>, &'a dyn Law<D>), SceneError> {
     let refused = |message: String, label: &str, help: &str| {
-        SceneError::new(SceneErrorKind::Conflict, message)
+        SceneError::conflict(message)
             .label(span.clone(), label)
             .help(help)
     };

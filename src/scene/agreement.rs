@@ -56,15 +56,12 @@ pub(crate) fn balanced_seam<const D: usize>(
         }
     };
     let name = spec.materials.get_key_value(material.name.as_str());
-    Err(SceneError::new(
-        SceneErrorKind::Conflict,
-        format!(
-            "the law of the material `{}`, {}, is not linear, finite elements are linear, and coupling `{}` does not balance the stresses of the two",
-            material.name,
-            material.law.name(),
-            traits.name
-        ),
-    )
+    Err(SceneError::conflict(format!(
+        "the law of the material `{}`, {}, is not linear, finite elements are linear, and coupling `{}` does not balance the stresses of the two",
+        material.name,
+        material.law.name(),
+        traits.name
+    ))
     .label(name.map_or(0..0, |(k, _)| k.span.clone()), "of this material")
     .help(remedy))
 }
@@ -81,27 +78,21 @@ pub(crate) fn cut_bonds<const D: usize>(
     if typed.cut_bonds == Some(CutBonds::Breaking)
         && !material.fracture.is_none_or(Fracture::is_of_stretch)
     {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!(
-                "`coupling.truncated.cut-bonds` is \"breaking\", and bonds of the material `{}` break by the state of their points, which those that the seam cuts do not know",
-                material.name
-            ),
-        )
+        return Err(SceneError::conflict(format!(
+            "`coupling.truncated.cut-bonds` is \"breaking\", and bonds of the material `{}` break by the state of their points, which those that the seam cuts do not know",
+            material.name
+        ))
         .label(named.span(), "cuts bonds")
         .help("let cut-bonds = \"linear\", or leave it out, and keep damage two horizons away from the seam"));
     }
     if typed.cut_bonds.is_none() || material.law.linearised().is_ordinary() {
         return Ok(());
     }
-    Err(SceneError::new(
-        SceneErrorKind::Conflict,
-        format!(
-            "`coupling.truncated.cut-bonds` is set, and the law of the material `{}`, {}, has no bonds that a seam could cut",
-            material.name,
-            material.law.name()
-        ),
-    )
+    Err(SceneError::conflict(format!(
+        "`coupling.truncated.cut-bonds` is set, and the law of the material `{}`, {}, has no bonds that a seam could cut",
+        material.name,
+        material.law.name()
+    ))
     .label(named.span(), "families end on the faces of elements")
     .help("remove cut-bonds"))
 }
@@ -124,14 +115,11 @@ pub(crate) fn elastic_elements<const D: usize>(
         return Ok(());
     };
     let name = spec.materials.get_key_value(material.name.as_str());
-    Err(SceneError::new(
-        SceneErrorKind::Conflict,
-        format!(
-            "finite elements of the material `{}` would stay elastic, and its law, {}, is not",
-            material.name,
-            material.law.name()
-        ),
-    )
+    Err(SceneError::conflict(format!(
+        "finite elements of the material `{}` would stay elastic, and its law, {}, is not",
+        material.name,
+        material.law.name()
+    ))
     .label(
         name.map_or(0..0, |(k, _)| k.span.clone()),
         "of this material",
@@ -180,14 +168,11 @@ pub(crate) fn crack_bands<const D: usize>(
             ),
         };
         let name = spec.materials.get_key_value(material.name.as_str());
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!(
-                "the material `{}` at {:?}: {why}",
-                material.name,
-                mesh.centroid(cell).as_slice()
-            ),
-        )
+        return Err(SceneError::conflict(format!(
+            "the material `{}` at {:?}: {why}",
+            material.name,
+            mesh.centroid(cell).as_slice()
+        ))
         .label(
             name.map_or(0..0, |(k, _)| k.span.clone()),
             "a crack is one row of cells wide",
@@ -243,7 +228,7 @@ pub(crate) fn memory<const D: usize>(
         material.name,
         material.law.name()
     );
-    let refused = |message: String| SceneError::new(SceneErrorKind::Conflict, message);
+    let refused = |message: String| SceneError::conflict(message);
     Err(match (is_static, follows) {
         (false, Some(follow)) => refused(format!("`zones.follow` is set, and {of}"))
             .label(
@@ -284,13 +269,10 @@ pub(crate) fn drag<const D: usize>(
         return Ok(());
     };
     let name = spec.materials.get_key_value(material.name.as_str());
-    Err(SceneError::new(
-        SceneErrorKind::Conflict,
-        format!(
-            "`zero-energy-control` of the material `{}` is \"drag\", which resists velocities of one time step, {why}",
-            material.name
-        ),
-    )
+    Err(SceneError::conflict(format!(
+        "`zero-energy-control` of the material `{}` is \"drag\", which resists velocities of one time step, {why}",
+        material.name
+    ))
     .label(name.map_or(0..0, |(k, _)| k.span.clone()), "of this material")
     .help("use zero-energy-control = \"bond-force\" or \"length\", or [solve.explicit] without `sub-steps`"))
 }
@@ -312,13 +294,10 @@ pub(crate) fn horizon_where_bonds_break<'a, const D: usize>(
         return Ok(());
     }
     let name = spec.materials.get_key_value(material.name.as_str());
-    Err(SceneError::new(
-        SceneErrorKind::Missing,
-        format!(
-            "`peridynamics` lacks `horizon`, and bonds of the material `{}` may break",
-            material.name
-        ),
-    )
+    Err(SceneError::missing(format!(
+        "`peridynamics` lacks `horizon`, and bonds of the material `{}` may break",
+        material.name
+    ))
     .label(
         name.map_or(0..0, |(key, _)| key.span.clone()),
         "its strength and its cracks depend on the horizon, which is a length of the material",
@@ -351,17 +330,14 @@ pub(crate) fn horizon<const D: usize>(
         if delta.is_finite() && delta > 0.0 && delta >= spacing * (1.0 - 1e-9) {
             continue;
         }
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            if delta.is_finite() && delta > 0.0 {
-                format!(
-                    "`peridynamics.horizon` is {delta} at {:?}, below the spacing {spacing} of the points there",
-                    x.as_slice()
-                )
-            } else {
-                format!("`peridynamics.horizon` is {delta} at {:?}", x.as_slice())
-            },
-        )
+        return Err(SceneError::wrong_value(if delta.is_finite() && delta > 0.0 {
+            format!(
+                "`peridynamics.horizon` is {delta} at {:?}, below the spacing {spacing} of the points there",
+                x.as_slice()
+            )
+        } else {
+            format!("`peridynamics.horizon` is {delta} at {:?}", x.as_slice())
+        })
         .label(
             (spec.peridynamics.as_ref())
                 .and_then(|p| p.horizon.as_ref())

@@ -4,7 +4,7 @@ use std::cell::{Cell, RefCell};
 
 use super::bounds_checks;
 use super::condition_at::ConditionAt;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::expression::Expression;
 use super::source::Span;
 use super::value::Text;
@@ -94,12 +94,9 @@ impl<const D: usize> Components<D> {
 /// The error of a component along an axis that the scene does not have.
 pub(super) fn no_such_axis<const D: usize>(place: &str, axis: usize, span: &Span) -> SceneError {
     let axis = AXES[axis];
-    SceneError::new(
-        SceneErrorKind::Dimension,
-        format!("`{place}.{axis}` in a scene of dimension {D}"),
-    )
-    .label(span.clone(), "no such axis")
-    .help(format!("remove `{axis}`"))
+    SceneError::dimension(format!("`{place}.{axis}` in a scene of dimension {D}"))
+        .label(span.clone(), "no such axis")
+        .help(format!("remove `{axis}`"))
 }
 
 /// The components that a scene types, of which there is one at least.
@@ -117,15 +114,14 @@ pub(crate) fn components<const D: usize>(
         }
     }
     if given.iter().all(|e| e.is_none()) {
-        return Err(SceneError::new(
-            SceneErrorKind::Missing,
-            format!("`{place}` prescribes no component"),
-        )
-        .label(name.span.clone(), "nothing prescribed")
-        .help(format!(
-            "add {}",
-            ["x = 0", "x = 0 or y = 0", "x = 0, y = 0 or z = 0"][D - 1]
-        )));
+        return Err(
+            SceneError::missing(format!("`{place}` prescribes no component"))
+                .label(name.span.clone(), "nothing prescribed")
+                .help(format!(
+                    "add {}",
+                    ["x = 0", "x = 0 or y = 0", "x = 0, y = 0 or z = 0"][D - 1]
+                )),
+        );
     }
     Ok(Components(std::array::from_fn(|k| given[k].clone())))
 }
@@ -185,10 +181,10 @@ impl<const D: usize> ConditionAt<'_, D> {
     ) -> SceneError {
         let typed = components.0[axis].as_ref();
         let span = typed.map_or(self.name.span.clone(), |e| e.span.clone());
-        SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`{}.{}` is {value} at {at}", self.place, AXES[axis]),
-        )
+        SceneError::wrong_value(format!(
+            "`{}.{}` is {value} at {at}",
+            self.place, AXES[axis]
+        ))
         .label(span, "no finite number there")
         .help("choose between branches with if(condition, a, b), or restrict the condition")
     }

@@ -4,7 +4,7 @@
 //! cannot hold (points that are no lattice, say) it is `splice`. Where only the seam itself can tell, because faces cut the lattice anywhere, an LPS has a low
 //! Poisson's ratio, or points have a stress, `truncated` is tried, and the run goes on with `splice` if the seam, or the proof, refuses it (`src/run/chosen.rs`).
 
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::material_interfaces;
 use super::materials::Material;
 use super::peridynamics;
@@ -115,10 +115,9 @@ fn without_peridynamics(spec: &SceneSpec) -> Result<(), SceneError> {
         (None, Some(name)) => (name.span.clone(), format!("zones.bodies.{name}")),
         (None, None) => return Ok(()),
     };
-    Err(SceneError::new(
-        SceneErrorKind::Missing,
-        format!("the scene draws `{what}` and has no [peridynamics] to fill it with"),
-    )
+    Err(SceneError::missing(format!(
+        "the scene draws `{what}` and has no [peridynamics] to fill it with"
+    ))
     .label(span, "would be finite elements")
     .help(
         "add [peridynamics] with horizon = ..., or take the zone out, or type coupling = \"local\"",

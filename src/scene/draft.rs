@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::bounds_checks;
 use super::condition_list;
 use super::conditions::Condition;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::impactors::{self, Impactor};
 use super::initial::Initial;
 use super::material_interfaces::MaterialInterface;
@@ -177,10 +177,10 @@ impl<'a, const D: usize> Draft<'a, D> {
         if self.spec.peridynamics.is_none()
             && !matches!(traits.zones, ZonesNeeded::Everywhere(Zone::Local))
         {
-            return Err(SceneError::new(
-                SceneErrorKind::Missing,
-                format!("coupling `{}` needs [peridynamics]", traits.name),
-            )
+            return Err(SceneError::missing(format!(
+                "coupling `{}` needs [peridynamics]",
+                traits.name
+            ))
             .label(selected.span.clone(), "has a peridynamic side")
             .help("add [peridynamics] with horizon = ..., or use coupling = \"local\""));
         }
@@ -400,12 +400,9 @@ fn densities<const D: usize>(spec: &SceneSpec, found: &[Material<D>]) -> Result<
         .materials
         .get_key_value(light.name.as_str())
         .map_or(0..0, |(k, _)| k.span.clone());
-    Err(SceneError::new(
-        SceneErrorKind::Missing,
-        format!("the material `{}` has no density, which [solve.explicit] needs", light.name),
-    )
-    .label(span, "has no inertia")
-    .help("add density = ..., in the units of the scene (kg/m³ beside N and m; t/mm³ beside N and mm)"))
+    Err(SceneError::missing(format!("the material `{}` has no density, which [solve.explicit] needs", light.name))
+        .label(span, "has no inertia")
+        .help("add density = ..., in the units of the scene (kg/m³ beside N and m; t/mm³ beside N and mm)"))
 }
 
 fn default_influence() -> Result<Influence, SceneError> {
@@ -435,12 +432,9 @@ fn solver(spec: &SceneSpec) -> Result<Solver, SceneError> {
     };
     let max_iterations = match &s.max_iterations {
         Some(n) if n.value == 0 => {
-            return Err(SceneError::new(
-                SceneErrorKind::WrongValue,
-                "`solver.max-iterations` is 0",
-            )
-            .label(n.span.clone(), "no iteration")
-            .help("allow at least 1; 500 suits most scenes"));
+            return Err(SceneError::wrong_value("`solver.max-iterations` is 0")
+                .label(n.span.clone(), "no iteration")
+                .help("allow at least 1; 500 suits most scenes"));
         }
         Some(n) => n.value,
         None => 500,

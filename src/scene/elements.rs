@@ -1,6 +1,6 @@
 //! Constitutive law of the finite elements of the points' materials, and its agreement with the rest of the scene.
 
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::materials::Material;
 use super::spec::{CouplingSpec, ElementsSpec, SceneSpec, ZonesNeeded};
 use crate::coupling::truncated::CutBonds;
@@ -31,10 +31,9 @@ pub(crate) fn elements<const D: usize>(
         .or_else(|| families_that_differ(spec));
     match obstacle {
         None => Ok(ElementsSpec::CauchyBorn),
-        Some((why, help)) => Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`peridynamics.elements` is \"cauchy-born\", and {why}"),
-        )
+        Some((why, help)) => Err(SceneError::conflict(format!(
+            "`peridynamics.elements` is \"cauchy-born\", and {why}"
+        ))
         .label(typed.span(), "of which bonds?")
         .help(help)),
     }

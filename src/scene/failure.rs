@@ -1,7 +1,7 @@
 //! Deformation and fracture of the bonds of a validated scene, and contact of its points.
 
 use super::bounds_checks;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::material_interfaces::MaterialInterface;
 use super::materials::Material;
 use super::region::{Region, region};
@@ -71,13 +71,10 @@ fn refuse_needless<const D: usize>(
 ) -> Result<(), SceneError> {
     if !breaks {
         let needless = |span, what: &str| {
-            SceneError::new(
-                SceneErrorKind::Conflict,
-                format!(
-                    "{what}, but no bond of the material `{}` breaks",
-                    material.name
-                ),
-            )
+            SceneError::conflict(format!(
+                "{what}, but no bond of the material `{}` breaks",
+                material.name
+            ))
             .label(span, "needs a material that breaks")
             .help(format!(
                 "add fracture-energy or critical-stretch to [materials.{}.…], or remove this",
@@ -115,14 +112,11 @@ fn bonds_of<const D: usize>(
     Ok(match typed {
         Some(bonds) => {
             if *bonds.get_ref() == BondKinematics::Exact && !is_objective {
-                return Err(SceneError::new(
-                    SceneErrorKind::Conflict,
-                    format!(
-                        "`peridynamics.bonds` is \"exact\", and the material `{}` is a {} law",
-                        material.name,
-                        material.law.name()
-                    ),
-                )
+                return Err(SceneError::conflict(format!(
+                    "`peridynamics.bonds` is \"exact\", and the material `{}` is a {} law",
+                    material.name,
+                    material.law.name()
+                ))
                 .label(
                     bonds.span(),
                     "its force does not follow the stretch of a bond",
@@ -223,7 +217,7 @@ fn softening_of<const D: usize>(
             "bonds of the material `{}` soften, but {against}",
             material.name
         );
-        return Err(SceneError::new(SceneErrorKind::Conflict, text)
+        return Err(SceneError::conflict(text)
             .label(name.map_or(0..0, |name| name.span.clone()), "softens")
             .help("type softening = 1, for bonds that break at once"));
     }
@@ -259,13 +253,10 @@ pub(crate) fn breaking<const D: usize>(
                 || interfaces.iter().any(|i| has_energy(i.fracture)));
     let is_of_stretch = fracture.is_none_or(Fracture::is_of_stretch);
     if let (Some(typed), false, true) = (calibration, has_energy, is_of_stretch) {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!(
-                "`peridynamics.calibration` is set, but the material `{}` has no fracture energy",
-                material.name
-            ),
-        )
+        return Err(SceneError::conflict(format!(
+            "`peridynamics.calibration` is set, but the material `{}` has no fracture energy",
+            material.name
+        ))
         .label(typed.span(), "of what?")
         .help("give the material a fracture-energy, or remove this"));
     }
@@ -281,8 +272,7 @@ pub(crate) fn breaking<const D: usize>(
         .as_ref()
         .and_then(|p| p.precision.as_ref());
     if let (Some(precision), true) = (precision, is_static) {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
+        return Err(SceneError::conflict(
             "`peridynamics.precision` is set, and nothing moves".to_owned(),
         )
         .label(

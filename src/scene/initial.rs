@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::components::{Components, components};
 use super::condition_at::ConditionAt;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::places::inside;
 use super::region::Region;
 use super::solve::{Clock, Pacing, still};
@@ -48,12 +48,11 @@ pub(crate) fn initial<const D: usize>(
         };
         let place = format!("initial.{name}.{word}");
         if clock.pacing != Pacing::Moving {
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                format!("`{place}` in a scene that does not move"),
-            )
-            .label(name.span.clone(), "there is no time zero")
-            .help("add [solve.explicit] with duration = ..., or remove it"));
+            return Err(
+                SceneError::conflict(format!("`{place}` in a scene that does not move"))
+                    .label(name.span.clone(), "there is no time zero")
+                    .help("add [solve.explicit] with duration = ..., or remove it"),
+            );
         }
         let InitialFieldSpec {
             inside: shape,

@@ -48,13 +48,10 @@ pub(crate) fn interfaces<const D: usize>(
         let interface = interface(name, typed, materials)?;
         let [a, b] = interface.between;
         if let Some(other) = MaterialInterface::of(&found, a, b) {
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                format!(
-                    "the interfaces `{}` and `{name}` are of the same two materials",
-                    other.name
-                ),
-            )
+            return Err(SceneError::conflict(format!(
+                "the interfaces `{}` and `{name}` are of the same two materials",
+                other.name
+            ))
             .label(name.span.clone(), "a second rule for these bonds")
             .help("keep one of them"));
         }
@@ -72,32 +69,28 @@ fn interface<const D: usize>(
         let place = materials.iter().position(|m| m.name == text.value);
         place.map(|n| n as u16).ok_or_else(|| {
             let known: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
-            SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!(
-                    "`interfaces.{name}.between` names the material `{}`",
-                    text.value
-                ),
-            )
+            SceneError::wrong_value(format!(
+                "`interfaces.{name}.between` names the material `{}`",
+                text.value
+            ))
             .label(text.span.clone(), "not a material of this scene")
             .help(format!("use two of {}", known.join(", ")))
         })
     };
     let [first, second] = &typed.between[..] else {
         let count = typed.between.len();
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`interfaces.{name}.between` names {count} materials"),
-        )
+        return Err(SceneError::wrong_value(format!(
+            "`interfaces.{name}.between` names {count} materials"
+        ))
         .label(name.span.clone(), "bonds join two")
         .help("name two materials, and add a table for each other pair"));
     };
     let (a, b) = (number(first)?, number(second)?);
     if a == b {
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`interfaces.{name}.between` names `{}` twice", first.value),
-        )
+        return Err(SceneError::wrong_value(format!(
+            "`interfaces.{name}.between` names `{}` twice",
+            first.value
+        ))
         .label(second.span.clone(), "the same material")
         .help("name two different ones"));
     }
@@ -107,13 +100,10 @@ fn interface<const D: usize>(
         .as_ref()
         .filter(|_| !law.linearised().is_pairwise())
     {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!(
-                "`interfaces.{name}.stiffness` is set, and the points of a {} have force states of their own",
-                law.name()
-            ),
-        )
+        return Err(SceneError::conflict(format!(
+            "`interfaces.{name}.stiffness` is set, and the points of a {} have force states of their own",
+            law.name()
+        ))
         .label(stiffness.span(), "of bonds that have half of their stiffness from either end")
         .help("remove it, or use bond-based materials"));
     }
@@ -132,9 +122,7 @@ fn fracture<const D: usize>(
 ) -> Result<Option<Fracture>, SceneError> {
     let place = |key: &str| format!("interfaces.{name}.{key}");
     let refused = |span: Span, message: String, label: &str, help: &str| {
-        Err(SceneError::new(SceneErrorKind::Conflict, message)
-            .label(span, label)
-            .help(help))
+        Err(SceneError::conflict(message).label(span, label).help(help))
     };
     let found = match (&typed.fracture_energy, &typed.critical_stretch) {
         (None, None) => return Ok(None),
@@ -221,17 +209,14 @@ pub(crate) fn law_of_points<const D: usize>(
                 &materials[usize::from(no.first)],
                 &materials[usize::from(no.second)],
             );
-            Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                format!(
-                    "the materials `{}` ({}) and `{}` ({}) both have points: {}",
-                    a.name,
-                    a.law.name(),
-                    b.name,
-                    b.law.name(),
-                    no.why
-                ),
-            )
+            Err(SceneError::conflict(format!(
+                "the materials `{}` ({}) and `{}` ({}) both have points: {}",
+                a.name,
+                a.law.name(),
+                b.name,
+                b.law.name(),
+                no.why
+            ))
             .label(span_of(spec, &a.name), "one")
             .label(span_of(spec, &b.name), "another")
             .help("keep the nonlocal and transition zones within one of them, or give both the same law; a softening-bond does not mix"))

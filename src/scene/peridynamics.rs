@@ -5,7 +5,7 @@ use toml::Spanned;
 use super::bounds_checks;
 use super::default_horizon::horizon_of;
 use super::default_points::default_points;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::expression::Expression;
 use super::region::position;
 use super::solve;
@@ -55,7 +55,7 @@ pub(crate) fn influence(place: &str, spec: &InfluenceSpec) -> Result<Influence, 
         } else {
             &p.alpha.span
         };
-        SceneError::new(SceneErrorKind::WrongValue, format!("`{place}`: {error}"))
+        SceneError::wrong_value(format!("`{place}`: {error}"))
             .label(span.clone(), "not offered")
             .help("degree is 0, 1, 3, 5 or 7; alpha is 0 or 1")
     })
@@ -87,12 +87,9 @@ pub(crate) fn peridynamics<const D: usize>(
             let (lo, hi) = mesh.bounds();
             let count: f64 = (hi - lo).iter().map(|l| l / spacing).product();
             if count > 1e9 {
-                return Err(SceneError::new(
-                    SceneErrorKind::WrongValue,
-                    format!(
-                        "`peridynamics.points.lattice.spacing` is {spacing}: {count:.1e} points would fill the mesh"
-                    ),
-                )
+                return Err(SceneError::wrong_value(format!(
+                    "`peridynamics.points.lattice.spacing` is {spacing}: {count:.1e} points would fill the mesh"
+                ))
                 .label(lattice.spacing.span.clone(), "too fine")
                 .help("use a larger spacing"));
             }
@@ -147,7 +144,7 @@ fn volumes(spec: &PeridynamicsSpec) -> Result<PartialVolume, SceneError> {
         return Ok(PartialVolume::Full);
     };
     let conflict = |message: &str, help: &str| {
-        Err(SceneError::new(SceneErrorKind::Conflict, message)
+        Err(SceneError::conflict(message)
             .label(typed.span(), "needs a lattice of points")
             .help(help))
     };

@@ -3,7 +3,7 @@
 use rustc_hash::FxHashSet;
 
 use super::condition_at::ConditionAt;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::region::{Region, region, unknown_set};
 use super::spec::ShapeSpec;
 use super::value::Text;
@@ -35,12 +35,11 @@ pub(crate) fn inside<const D: usize>(
     mesh: &Mesh<D>,
 ) -> Result<Region<D>, SceneError> {
     if let ShapeSpec::Set(set) = shape {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`{place}.inside` is the set `{set}`"),
-        )
-        .label(set.span.clone(), "no shape")
-        .help("name a set by `on`, or give a shape such as `box`"));
+        return Err(
+            SceneError::conflict(format!("`{place}.inside` is the set `{set}`"))
+                .label(set.span.clone(), "no shape")
+                .help("name a set by `on`, or give a shape such as `box`"),
+        );
     }
     let found = region(&format!("{place}.inside"), shape, mesh)?;
     let tolerance = 1e-9 * (mesh.bounds().1 - mesh.bounds().0).norm();
@@ -49,12 +48,11 @@ pub(crate) fn inside<const D: usize>(
     if holds_something {
         return Ok(found);
     }
-    Err(SceneError::new(
-        SceneErrorKind::Empty,
-        format!("`{place}.inside` holds no part of the mesh"),
+    Err(
+        SceneError::empty(format!("`{place}.inside` holds no part of the mesh"))
+            .label(name.span.clone(), "acts nowhere")
+            .help(extent(mesh)),
     )
-    .label(name.span.clone(), "acts nowhere")
-    .help(extent(mesh)))
 }
 
 /// The extent of a mesh, as a remedy for what misses it.
@@ -95,12 +93,9 @@ impl<'a, const D: usize> ConditionAt<'a, D> {
                     Some(_) => ("both `on` and `inside`", "two places"),
                     None => ("neither `on` nor `inside`", "where?"),
                 };
-                return Err(SceneError::new(
-                    SceneErrorKind::Choice,
-                    format!("`{place}` has {what}"),
-                )
-                .label(self.name.span.clone(), label)
-                .help("keep one: `on = \"set\"` of the mesh, or `inside = { box = ... }`"));
+                return Err(SceneError::choice(format!("`{place}` has {what}"))
+                    .label(self.name.span.clone(), label)
+                    .help("keep one: `on = \"set\"` of the mesh, or `inside = { box = ... }`"));
             }
         })
     }
@@ -137,13 +132,10 @@ impl<'a, const D: usize> ConditionAt<'a, D> {
         if let Some(inner) = facets.iter().find(|f| !outer.contains(&sorted(f))) {
             let nodes = inner.iter().map(|&n| mesh.nodes[n as usize]);
             let middle = nodes.sum::<Vector<D>>() / inner.len() as f64;
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                format!(
-                    "`{place}.on`: the facet of the set `{on}` at {:?} is not at the boundary of the mesh",
-                    middle.as_slice()
-                ),
-            )
+            return Err(SceneError::conflict(format!(
+                "`{place}.on`: the facet of the set `{on}` at {:?} is not at the boundary of the mesh",
+                middle.as_slice()
+            ))
             .label(on.span.clone(), "has no outside there")
             .help("name a set of facets that each belong to one cell; inside of the body prescribe a traction"));
         }
@@ -155,7 +147,7 @@ impl<'a, const D: usize> ConditionAt<'a, D> {
         let facets = self.facet_set(on)?;
         self.mesh.locate_facets(facets).map_err(|error| {
             let message = format!("`{}.on`: {error}", self.place);
-            SceneError::new(SceneErrorKind::Conflict, message)
+            SceneError::conflict(message)
                 .label(on.span.clone(), "not a face of a cell")
                 .help("let the set hold faces of the cells of this mesh only")
         })
@@ -166,10 +158,9 @@ fn not_empty(place: &str, set: &Text, count: usize) -> Result<(), SceneError> {
     if count > 0 {
         return Ok(());
     }
-    Err(SceneError::new(
-        SceneErrorKind::Empty,
-        format!("`{place}`: the set `{set}` of the mesh is empty"),
+    Err(
+        SceneError::empty(format!("`{place}`: the set `{set}` of the mesh is empty"))
+            .label(set.span.clone(), "empty")
+            .help("put facets or nodes into it, or name another set"),
     )
-    .label(set.span.clone(), "empty")
-    .help("put facets or nodes into it, or name another set"))
 }

@@ -10,7 +10,7 @@ use self::held_places::HeldPlaces;
 
 use super::coupling_selection::follows;
 use super::draft::Draft;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::region::{self, Region};
 use super::section::UncutBody;
 use super::source::Span;
@@ -140,7 +140,7 @@ fn with_rim<const D: usize>(
     let touched = placed.is_none().then(|| met(draft)).flatten();
     let (before, _) = draft.with_coupling(placed.or(touched.as_ref()), instead)?;
     let conflict = |what: String, help: &str| {
-        SceneError::new(SceneErrorKind::Conflict, what)
+        SceneError::conflict(what)
             .label(span.clone(), "a layer of elements on the lattice")
             .help(help.to_owned())
     };
@@ -345,10 +345,9 @@ fn refuse_others(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
     ];
     match others.iter().find(|other| other.1) {
         None => Ok(()),
-        Some((key, _)) => Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("a rim of its own and `{key}` do not go together"),
-        )
+        Some((key, _)) => Err(SceneError::conflict(format!(
+            "a rim of its own and `{key}` do not go together"
+        ))
         .label(span.clone(), "a layer of elements on the lattice")
         .help(format!("leave out {key}, or use rim = \"mesh\""))),
     }

@@ -202,14 +202,12 @@ fn check(
     let place = path.join(".");
     match table.len() {
         1 => Ok(()),
-        0 => Err(
-            SceneError::new(SceneErrorKind::Choice, format!("`{place}` is empty"))
-                .label(
-                    if span.is_empty() { key } else { span },
-                    "nothing is chosen",
-                )
-                .help(format!("write exactly one of {}", quoted(options))),
-        ),
+        0 => Err(SceneError::choice(format!("`{place}` is empty"))
+            .label(
+                if span.is_empty() { key } else { span },
+                "nothing is chosen",
+            )
+            .help(format!("write exactly one of {}", quoted(options)))),
         _ => {
             let mut keys: Vec<_> = table.keys().collect();
             keys.sort_by_key(|k| k.span().start);
@@ -229,10 +227,10 @@ fn check(
                 }
                 return Err(error.label(stranger.span(), "not known here"));
             }
-            let mut error = SceneError::new(
-                SceneErrorKind::Choice,
-                format!("`{place}` holds {} at once", quoted(&names)),
-            )
+            let mut error = SceneError::choice(format!(
+                "`{place}` holds {} at once",
+                quoted(&names)
+            ))
             .help(format!(
                 "keep exactly one of {}; `--set {place}={}` replaces the one that stands there",
                 quoted(options),

@@ -1,7 +1,7 @@
 //! The temperature of a body.
 
 use super::bounds_checks;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::expression::Expression;
 use super::materials::Material;
 use super::solve::{Clock, Solve};
@@ -37,10 +37,10 @@ pub(super) fn temperature<const D: usize>(
         for &t in clock.instants(spec.value.depends_on_time()) {
             let found = spec.value.eval_at(&padded(x), t);
             if !found.is_finite() {
-                return Err(SceneError::new(
-                    SceneErrorKind::WrongValue,
-                    format!("`{place}` is {found} at {:?}, t = {t}", x.as_slice()),
-                )
+                return Err(SceneError::wrong_value(format!(
+                    "`{place}` is {found} at {:?}, t = {t}",
+                    x.as_slice()
+                ))
                 .label(spec.value.span.clone(), "no finite number there")
                 .help("choose between branches with if(condition, a, b)"));
             }
@@ -64,7 +64,7 @@ pub(super) fn agrees<const D: usize>(
     };
     let span = temperature.value.span.clone();
     let refuse = |what: String, help: &str| {
-        let error = SceneError::new(SceneErrorKind::Conflict, what);
+        let error = SceneError::conflict(what);
         Err(error.label(span.clone(), "thermal strain").help(help))
     };
     if let Some(cold) = materials.iter().find(|m| m.expansion.is_none()) {
@@ -117,10 +117,9 @@ fn unheated(spec: &SceneSpec) -> Result<(), SceneError> {
     let Some((name, span)) = spec.materials.iter().find_map(|(n, m)| Some((n, of(m)?))) else {
         return Ok(());
     };
-    Err(SceneError::new(
-        SceneErrorKind::Missing,
-        format!("the material `{name}` has a thermal-expansion, and the scene no temperature"),
-    )
+    Err(SceneError::missing(format!(
+        "the material `{name}` has a thermal-expansion, and the scene no temperature"
+    ))
     .label(span, "expands by nothing")
     .help("add [temperature] with value = \"...\", or remove the key"))
 }

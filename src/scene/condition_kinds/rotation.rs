@@ -7,7 +7,7 @@ use super::ConditionKind;
 use crate::scene::components::Components;
 use crate::scene::condition_at::ConditionAt;
 use crate::scene::conditions::{Condition, Prescribed};
-use crate::scene::error::{SceneError, SceneErrorKind};
+use crate::scene::error::SceneError;
 use crate::scene::expression::Expression;
 use crate::scene::region::position;
 use crate::scene::spec::ShapeSpec;
@@ -39,22 +39,20 @@ impl ConditionKind for RotationSpec {
     fn build<const D: usize>(&self, at: &ConditionAt<'_, D>) -> Result<Condition<D>, SceneError> {
         let (place, name) = (at.place, at.name);
         if D == 1 {
-            return Err(SceneError::new(
-                SceneErrorKind::Dimension,
-                format!("`{place}` in a scene of dimension 1"),
-            )
-            .label(name.span.clone(), "a bar does not rotate")
-            .help("prescribe a displacement"));
+            return Err(
+                SceneError::dimension(format!("`{place}` in a scene of dimension 1"))
+                    .label(name.span.clone(), "a bar does not rotate")
+                    .help("prescribe a displacement"),
+            );
         }
         let angle = format!("{place}.angle");
         at.clock.admits(&angle, &self.angle)?;
         if self.angle.depends_on_position() {
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                format!("`{angle}` depends on position"),
-            )
-            .label(self.angle.span.clone(), "not a rigid rotation")
-            .help("let the angle be a number or depend on t only"));
+            return Err(
+                SceneError::conflict(format!("`{angle}` depends on position"))
+                    .label(self.angle.span.clone(), "not a rigid rotation")
+                    .help("let the angle be a number or depend on t only"),
+            );
         }
         let centre = position::<D>(&format!("{place}.center"), &self.center)?;
         let axis = axis::<D>(place, name, self)?;
@@ -75,20 +73,16 @@ fn axis<const D: usize>(
     let k = match (&spec.axis, D) {
         (None, 2) => [0.0, 0.0, 1.0],
         (Some(typed), 2) => {
-            return Err(SceneError::new(
-                SceneErrorKind::Dimension,
-                format!("`{place}.axis` in a scene of dimension 2"),
-            )
-            .label(typed.span.clone(), "the axis of a plane is z")
-            .help("remove `axis`"));
+            return Err(
+                SceneError::dimension(format!("`{place}.axis` in a scene of dimension 2"))
+                    .label(typed.span.clone(), "the axis of a plane is z")
+                    .help("remove `axis`"),
+            );
         }
         (None, _) => {
-            return Err(SceneError::new(
-                SceneErrorKind::Missing,
-                format!("`{place}` has no `axis`"),
-            )
-            .label(name.span.clone(), "about which axis?")
-            .help("add axis = [0, 0, 1]"));
+            return Err(SceneError::missing(format!("`{place}` has no `axis`"))
+                .label(name.span.clone(), "about which axis?")
+                .help("add axis = [0, 0, 1]"));
         }
         (Some(typed), _) => {
             let k = position::<D>(&format!("{place}.axis"), typed)?;
@@ -98,10 +92,9 @@ fn axis<const D: usize>(
             {
                 Some(k) => std::array::from_fn(|i| k[i]),
                 None => {
-                    return Err(SceneError::new(
-                        SceneErrorKind::WrongValue,
-                        format!("`{place}.axis` has no direction"),
-                    )
+                    return Err(SceneError::wrong_value(format!(
+                        "`{place}.axis` has no direction"
+                    ))
                     .label(typed.span.clone(), "zero")
                     .help("write a direction such as [0, 0, 1]"));
                 }

@@ -20,7 +20,7 @@ use crate::scene::bounds_checks;
 use crate::scene::components::{Components, no_such_axis};
 use crate::scene::condition_at::ConditionAt;
 use crate::scene::conditions::{Condition, ConditionTerm, Prescribed};
-use crate::scene::error::{SceneError, SceneErrorKind};
+use crate::scene::error::SceneError;
 use crate::scene::region::Region;
 use crate::scene::spec::ShapeSpec;
 use crate::scene::value::{Number, Text};
@@ -58,11 +58,9 @@ impl ConditionKind for SpringSpec {
         let place = at.place;
         let given = [&self.x, &self.y, &self.z];
         let choice = |what: &str, help: &str| {
-            Err(
-                SceneError::new(SceneErrorKind::Choice, format!("`{place}` has {what}"))
-                    .label(at.name.span.clone(), "springs")
-                    .help(help),
-            )
+            Err(SceneError::choice(format!("`{place}` has {what}"))
+                .label(at.name.span.clone(), "springs")
+                .help(help))
         };
         let mut stiffness = Vector::<D>::zeros();
         for (k, number) in given.iter().enumerate() {

@@ -7,7 +7,7 @@ use super::ConditionKind;
 use crate::scene::components::Components;
 use crate::scene::condition_at::ConditionAt;
 use crate::scene::conditions::{Condition, Prescribed};
-use crate::scene::error::{SceneError, SceneErrorKind};
+use crate::scene::error::SceneError;
 use crate::scene::expression::Expression;
 use crate::scene::value::Text;
 
@@ -29,11 +29,9 @@ impl ConditionKind for SymmetrySpec {
         let (from, to) = mesh.bounds_of(&nodes);
         let flat: Vec<usize> = (0..D).filter(|&k| to[k] - from[k] <= tolerance).collect();
         let refuse = |why: String, help: &str| {
-            Err(
-                SceneError::new(SceneErrorKind::Conflict, format!("`{place}.on`: {why}"))
-                    .label(self.on.span.clone(), "whose normal?")
-                    .help(help),
-            )
+            Err(SceneError::conflict(format!("`{place}.on`: {why}"))
+                .label(self.on.span.clone(), "whose normal?")
+                .help(help))
         };
         match flat[..] {
             [axis] => {

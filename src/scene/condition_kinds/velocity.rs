@@ -7,7 +7,7 @@ use super::{ConditionKind, displacement::held};
 use crate::scene::components::Components;
 use crate::scene::condition_at::ConditionAt;
 use crate::scene::conditions::{Condition, Prescribed};
-use crate::scene::error::{SceneError, SceneErrorKind};
+use crate::scene::error::SceneError;
 use crate::scene::expression::Expression;
 use crate::scene::solve::Pacing;
 use crate::scene::spec::ShapeSpec;
@@ -50,12 +50,11 @@ fn moves<const D: usize>(
 ) -> Result<(), SceneError> {
     let place = at.place;
     if at.clock.pacing != Pacing::Moving {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`{place}` in a scene that does not move"),
-        )
-        .label(at.name.span.clone(), "a velocity")
-        .help("add [solve.explicit] with duration = ..., or prescribe a displacement"));
+        return Err(
+            SceneError::conflict(format!("`{place}` in a scene that does not move"))
+                .label(at.name.span.clone(), "a velocity")
+                .help("add [solve.explicit] with duration = ..., or prescribe a displacement"),
+        );
     }
     match components
         .0
@@ -64,11 +63,8 @@ fn moves<const D: usize>(
         .find(|e| e.depends_on_time() && e.depends_on_position())
     {
         None => Ok(()),
-        Some(e) => Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`{place}` depends on time and on position"),
-        )
-        .label(e.span.clone(), "has no displacement in closed form")
-        .help("prescribe the displacement, its integral over t; or let the velocity depend on one of the two")),
+        Some(e) => Err(SceneError::conflict(format!("`{place}` depends on time and on position"))
+            .label(e.span.clone(), "has no displacement in closed form")
+            .help("prescribe the displacement, its integral over t; or let the velocity depend on one of the two")),
     }
 }
