@@ -130,7 +130,7 @@ fn translate(error: &toml::de::Error, places: &DeTable<'_>) -> SceneError {
         )
         .label(span, "a table of one key belongs here")
         .help(match tagged_table::options(&path) {
-            Some(options) => format!("write {{ key = ... }} with one of {}", quoted(options)),
+            Some(options) => format!("write {{ key = ... }} with one of {}", quoted(&options)),
             None => "see `bondline schema` for the choices".to_owned(),
         });
     }
