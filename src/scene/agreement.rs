@@ -1,6 +1,6 @@
 //! Agreement of parts of a scene that are right alone: materials with zones, horizons with spacings.
 
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
 use super::solve::Solve;
@@ -55,14 +55,13 @@ pub(crate) fn balanced_seam<const D: usize>(
             "use coupling = \"nonlocal\"; or, of a law without memory, coupling = \"splice\" with peridynamics.elements = \"cauchy-born\""
         }
     };
-    let name = spec.materials.get_key_value(material.name.as_str());
     Err(SceneError::conflict(format!(
         "the law of the material `{}`, {}, is not linear, finite elements are linear, and coupling `{}` does not balance the stresses of the two",
         material.name,
         material.law.name(),
         traits.name
     ))
-    .label(name.map_or(0..0, |(k, _)| k.span.clone()), "of this material")
+    .label(spec.span_of_material(&material.name), "of this material")
     .help(remedy))
 }
 
@@ -114,16 +113,12 @@ pub(crate) fn elastic_elements<const D: usize>(
     let Some(material) = of_local.find(|m| bends(m)) else {
         return Ok(());
     };
-    let name = spec.materials.get_key_value(material.name.as_str());
     Err(SceneError::conflict(format!(
         "finite elements of the material `{}` would stay elastic, and its law, {}, is not",
         material.name,
         material.law.name()
     ))
-    .label(
-        name.map_or(0..0, |(k, _)| k.span.clone()),
-        "of this material",
-    )
+    .label(spec.span_of_material(&material.name), "of this material")
     .help("use coupling = \"nonlocal\", or give these cells an elastic material of their own"))
 }
 
@@ -167,14 +162,13 @@ pub(crate) fn crack_bands<const D: usize>(
                 "use cells of first order where this material is".to_owned(),
             ),
         };
-        let name = spec.materials.get_key_value(material.name.as_str());
         return Err(SceneError::conflict(format!(
             "the material `{}` at {:?}: {why}",
             material.name,
             mesh.centroid(cell).as_slice()
         ))
         .label(
-            name.map_or(0..0, |(k, _)| k.span.clone()),
+            spec.span_of_material(&material.name),
             "a crack is one row of cells wide",
         )
         .help(help));
@@ -236,15 +230,12 @@ pub(crate) fn memory<const D: usize>(
                 "lays points and elements out anew, and their history would be lost",
             )
             .help("draw a zone that is wide enough, or remove it"),
-        _ => {
-            let name = spec.materials.get_key_value(material.name.as_str());
-            refused(format!("{of}, and a static scene has no time"))
-                .label(
-                    name.map_or(0..0, |(k, _)| k.span.clone()),
-                    "its forces depend on how the load came",
-                )
-                .help("add [solve.quasi-static] with steps = ..., or [solve.explicit]")
-        }
+        _ => refused(format!("{of}, and a static scene has no time"))
+            .label(
+                spec.span_of_material(&material.name),
+                "its forces depend on how the load came",
+            )
+            .help("add [solve.quasi-static] with steps = ..., or [solve.explicit]"),
     })
 }
 
@@ -268,19 +259,18 @@ pub(crate) fn drag<const D: usize>(
     let Some(material) = used.find(drags) else {
         return Ok(());
     };
-    let name = spec.materials.get_key_value(material.name.as_str());
     Err(SceneError::conflict(format!(
         "`zero-energy-control` of the material `{}` is \"drag\", which resists velocities of one time step, {why}",
         material.name
     ))
-    .label(name.map_or(0..0, |(k, _)| k.span.clone()), "of this material")
+    .label(spec.span_of_material(&material.name), "of this material")
     .help("use zero-energy-control = \"bond-force\" or \"length\", or [solve.explicit] without `sub-steps`"))
 }
 
 /// Refuses a horizon that was `taken` since none is typed where bonds of the points' materials may break.
 ///
 /// # Errors
-/// [`SceneErrorKind::Missing`], with the horizon that would have been taken.
+/// [`SceneErrorKind::Missing`](crate::scene::SceneErrorKind::Missing), with the horizon that would have been taken.
 pub(crate) fn horizon_where_bonds_break<'a, const D: usize>(
     spec: &SceneSpec,
     taken: Option<f64>,
@@ -293,15 +283,11 @@ pub(crate) fn horizon_where_bonds_break<'a, const D: usize>(
     if *solve == Solve::Static {
         return Ok(());
     }
-    let name = spec.materials.get_key_value(material.name.as_str());
     Err(SceneError::missing(format!(
         "`peridynamics` lacks `horizon`, and bonds of the material `{}` may break",
         material.name
     ))
-    .label(
-        name.map_or(0..0, |(key, _)| key.span.clone()),
-        "its strength and its cracks depend on the horizon, which is a length of the material",
-    )
+    .label(spec.span_of_material(&material.name), "its strength and its cracks depend on the horizon, which is a length of the material")
     .help(format!(
         "add horizon = {} to [peridynamics], three spacings of the points, or the length that its cracks have",
         number(taken)

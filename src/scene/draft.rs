@@ -396,10 +396,7 @@ fn densities<const D: usize>(spec: &SceneSpec, found: &[Material<D>]) -> Result<
     let Some(light) = found.iter().find(|m| m.density <= 0.0) else {
         return Ok(());
     };
-    let span = spec
-        .materials
-        .get_key_value(light.name.as_str())
-        .map_or(0..0, |(k, _)| k.span.clone());
+    let span = spec.span_of_material(&light.name);
     Err(SceneError::missing(format!("the material `{}` has no density, which [solve.explicit] needs", light.name))
         .label(span, "has no inertia")
         .help("add density = ..., in the units of the scene (kg/m³ beside N and m; t/mm³ beside N and mm)"))

@@ -217,16 +217,11 @@ pub(crate) fn law_of_points<const D: usize>(
                 b.law.name(),
                 no.why
             ))
-            .label(span_of(spec, &a.name), "one")
-            .label(span_of(spec, &b.name), "another")
+            .label(spec.span_of_material(&a.name), "one")
+            .label(spec.span_of_material(&b.name), "another")
             .help("keep the nonlocal and transition zones within one of them, or give both the same law; a softening-bond does not mix"))
         }
     }
-}
-
-fn span_of(spec: &SceneSpec, name: &str) -> Span {
-    let found = spec.materials.get_key_value(name);
-    found.map_or(0..0, |(key, _)| key.span.clone())
 }
 
 /// Says which materials points have, and what their bonds are between two, if they have several.
@@ -305,8 +300,8 @@ impl<const D: usize> Pair<'_, D> {
             SceneErrorKind::Later,
             format!("points have the materials `{a}` and `{b}`, and {what}"),
         )
-        .label(span_of(self.spec, a), "one")
-        .label(span_of(self.spec, b), why)
+        .label(self.spec.span_of_material(a), "one")
+        .label(self.spec.span_of_material(b), why)
         .help(help)
     }
 

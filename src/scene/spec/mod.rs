@@ -63,6 +63,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::condition_kinds::ConditionSpec;
+use super::error::Span;
 use super::value::{Number, Text};
 use crate::material::Kinematics;
 
@@ -141,6 +142,12 @@ pub struct SceneSpec {
 }
 
 impl SceneSpec {
+    /// Span of the name of a material; an empty one of a name that there is not.
+    pub(super) fn span_of_material(&self, name: &str) -> Span {
+        let found = self.materials.get_key_value(name);
+        found.map_or(0..0, |(key, _)| key.span.clone())
+    }
+
     /// Space dimension.
     pub fn dimension(&self) -> usize {
         self.kinematics.get_ref().dimension()
