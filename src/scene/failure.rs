@@ -6,6 +6,7 @@ use super::material_interfaces::MaterialInterface;
 use super::materials::Material;
 use super::region::{Region, region};
 use super::spec::{CalibrationSpec, ContactSpec, EdgeSpec, SceneSpec, SolveSpec};
+use crate::coupling::semidiscrete::behaviour::ContactBehaviour;
 use crate::mesh::Mesh;
 use crate::peridynamics::BondWeights;
 use crate::peridynamics::bond_force::{BondKinematics, BondSoftening, Storage};
@@ -33,7 +34,7 @@ pub struct Breaking<const D: usize> {
     /// Action when damage reaches the edge of the nonlocal zone.
     pub at_edge: EdgeSpec,
     /// Short-range contact.
-    pub contact: Option<Contact>,
+    pub contact: Option<ContactBehaviour>,
 }
 
 impl<const D: usize> Breaking<D> {
@@ -52,15 +53,6 @@ pub struct FractureOfMaterials {
     pub used: Vec<u16>,
     /// Interfaces that the scene types.
     pub interfaces: Vec<MaterialInterface>,
-}
-
-/// Short-range contact.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Contact {
-    /// Distance below which points repel each other, over the spacing.
-    pub radius_factor: f64,
-    /// Stiffness of the repulsion over that of a bond.
-    pub stiffness_factor: f64,
 }
 
 /// Refuses keys about broken bonds where no bond breaks.
@@ -306,8 +298,8 @@ pub(crate) fn breaking<const D: usize>(
     })
 }
 
-fn contact(spec: &ContactSpec) -> Result<Contact, SceneError> {
-    let radius_factor = match &spec.radius_factor {
+fn contact(spec: &ContactSpec) -> Result<ContactBehaviour, SceneError> {
+    let approach = match &spec.radius_factor {
         Some(r) => bounds_checks::within(
             "contact.radius-factor",
             r,
@@ -317,12 +309,12 @@ fn contact(spec: &ContactSpec) -> Result<Contact, SceneError> {
         )?,
         None => 0.9,
     };
-    let stiffness_factor = match &spec.stiffness_factor {
+    let stiffness = match &spec.stiffness_factor {
         Some(s) => bounds_checks::positive("contact.stiffness-factor", s)?,
         None => 15.0,
     };
-    Ok(Contact {
-        radius_factor,
-        stiffness_factor,
+    Ok(ContactBehaviour {
+        approach,
+        stiffness,
     })
 }

@@ -80,7 +80,7 @@ pub use adaptive_zone::Follow;
 pub use conditions::{Components, Condition, Field, Prescribed, Support};
 pub use error::{SceneError, SceneErrorKind};
 pub use expression::{Expression, ExpressionError};
-pub use failure::{Breaking, Contact};
+pub use failure::Breaking;
 pub use function::Function;
 pub use impactors::{Impactor, ImpactorMotion};
 pub use initial::{Initial, InitialKind};

@@ -2,9 +2,7 @@
 
 #![deny(clippy::wildcard_enum_match_arm)]
 
-use crate::coupling::semidiscrete::behaviour::{
-    BondBehaviour, BondThreshold, ContactBehaviour, SystemError,
-};
+use crate::coupling::semidiscrete::behaviour::{BondBehaviour, BondThreshold, SystemError};
 use crate::coupling::semidiscrete::{CoupledSystem, masses};
 use crate::fem::Locator;
 use crate::observe::report::number;
@@ -94,10 +92,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
             failure: failure.clone(),
             softening: breaking.softening.softening(),
             no_fail: &can_fail_nowhere,
-            contact: breaking.contact.map(|c| ContactBehaviour {
-                approach: c.radius_factor,
-                stiffness: c.stiffness_factor,
-            }),
+            contact: breaking.contact,
             storage,
             heat: thermal.map(Thermal::free_stretch),
             broken: start.broken,
