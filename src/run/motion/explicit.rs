@@ -96,28 +96,19 @@ pub(crate) fn run<const D: usize>(
         sharing: sharing(&problem, &rest, options),
     };
     loop {
-        let (segment, back) = match from {
-            From::Start(..) => lay_out(begun, problem, &rest, start, progress, |laid_out| {
-                run_segment(laid_out, from, &rest, spec, options, progress)
-            })?,
-            From::Switch(mut between) => {
-                let bonds = std::mem::take(&mut between.broken);
-                let start = LayoutStart {
-                    broken: Some(&bonds),
-                    ..start
-                };
-                lay_out(begun, problem, &rest, start, progress, |laid_out| {
-                    run_segment(
-                        laid_out,
-                        From::Switch(between),
-                        &rest,
-                        spec,
-                        options,
-                        progress,
-                    )
-                })?
-            }
+        let bonds = match &mut from {
+            From::Start(..) => None,
+            From::Switch(between) => Some(std::mem::take(&mut between.broken)),
         };
+        let start = LayoutStart {
+            broken: bonds.as_ref(),
+            ..start
+        };
+        let (segment, back) = lay_out(begun, problem, &rest, start, progress, |laid_out| {
+            let model = laid_out.model;
+            run_segment(laid_out, from, &rest, spec, options, progress)
+                .map_err(|error| explained(error, model, &model.local_laws(&rest.local_laws)))
+        })?;
         problem = back;
         match segment {
             RunSegment::Ended(summary) => return Ok(*summary),
@@ -148,20 +139,6 @@ struct SegmentRecord {
     taken: (u64, f64),
 }
 
-/// Steps with one layout of the zones, from the beginning, a checkpoint, or where the last one ended.
-fn run_segment<'r, const D: usize>(
-    laid_out: ModelSetup<'_, D>,
-    from: From<'r, D>,
-    rest: &'r RunSettings<D>,
-    spec: &Spec,
-    options: &RunOptions<'r>,
-    progress: &dyn Progress,
-) -> Result<RunSegment<'r, D>, RunError> {
-    let model = laid_out.model;
-    take_segment(laid_out, from, rest, spec, options, progress)
-        .map_err(|error| explained(error, model, &model.local_laws(&rest.local_laws)))
-}
-
 /// Decides whether the balance of energy is watched: a proof for the undeformed body need not hold for one whose law changes with its strain.
 fn balance_of<const D: usize>(
     model: &Model<D>,
@@ -183,9 +160,9 @@ fn balance_of<const D: usize>(
     }
 }
 
-/// The steps of [`run_segment`].
+/// Steps with one layout of the zones, from the beginning, a checkpoint, or where the last one ended.
 // One function: what a segment is made of, in the order in which it is found.
-fn take_segment<'r, const D: usize>(
+fn run_segment<'r, const D: usize>(
     laid_out: ModelSetup<'_, D>,
     from: From<'r, D>,
     rest: &'r RunSettings<D>,

@@ -7,10 +7,9 @@ use super::breaks::breaks;
 use super::driven_impactors::prescribed;
 use super::dynamic_system::{DynamicSystem, start};
 use super::impact::impacted;
-use super::impact_record::ImpactRecord;
 use super::rezoning::Leaving;
 use super::saved::{EdgeReached, Saved, SavedZone, StepChoice};
-use super::setup::{RunSetup, restore};
+use super::setup::{RunSetup, recorder, restore};
 use super::time_dependent_loads::SceneDrive;
 use super::time_step::{held, paced, repaced};
 use super::writer::Recorder;
@@ -136,21 +135,13 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         }
         restore(moving.system.as_mut(), saved.as_ref(), &file)?;
         let written = saved.as_ref().map(|s| &s.written);
-        let peaks = written.map(|w| &w.peaks[..]);
-        let mut recorder = Recorder::new(
-            &rest.output,
-            &rest.conditions,
-            &Sampler::new(model),
-            impact.map(|impact| ImpactRecord::new(impact, &rest.impactors, peaks)),
+        let of = (
+            impact,
             breaks(moving.system.as_ref(), rest),
             moving.is_linear,
-            file,
-            RunOptions {
-                checkpoint_every: options.checkpoint_every.or(spec.checkpoint_every),
-                ..options
-            },
-            written,
-        )?;
+        );
+        let every = (options, spec.checkpoint_every);
+        let mut recorder = recorder((model, rest), every, of, file, written)?;
         recorder.hold(drive.holders());
         recorder.cut(model, rest, self.terms)?;
         let resumed = saved.is_some();

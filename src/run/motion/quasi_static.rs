@@ -18,11 +18,12 @@ use super::inside_step::InsideStep;
 use super::load_step_params::{equilibrium_params, step_choice};
 use super::parted::has_parted;
 use super::saved::{EdgeReached, Saved, StepChoice};
-use super::setup::{ModelSetup, laid_out, opened, restore};
+use super::setup::{ModelSetup, laid_out, opened, recorder, restore};
 use super::spread_factors::Leads;
 use super::step_observer::FieldOutput;
 use super::time_dependent_loads::SceneDrive;
 use super::writer::{Moment, Recorder};
+use crate::model::Model;
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::summary::{
@@ -46,10 +47,6 @@ use crate::solve::quasi_static::{
     Refactor, TangentFactors,
 };
 use crate::system::SemiDiscrete;
-use crate::{
-    coupling::Impact,
-    model::{Model, Sampler},
-};
 
 /// Runs a scene under a load that grows.
 pub(crate) fn run<const D: usize>(
@@ -110,7 +107,10 @@ fn load_steps<const D: usize>(
     let at = saved.as_ref();
     restore(system.as_mut(), at, &file)?;
     let breaks = breaks(system.as_ref(), rest);
-    let mut recorder = recorder((model, rest), spec, options, (impact, breaks), file, at)?;
+    let every = spec.checkpoint_every;
+    let written = at.map(|saved| &saved.written);
+    let of = (impact, breaks, false);
+    let mut recorder = recorder((model, rest), (*options, every), of, file, written)?;
     recorder.hold(drive.holders());
     recorder.cut(model, rest, Arc::clone(&laid_out.terms))?;
     let (edge, seen) = at.map_or_else(Default::default, |s| (s.edge, s.seen.clone()));
@@ -171,36 +171,6 @@ fn linear_parts<'a, const D: usize>(
 ) -> Result<LinearParts<'a, D>, RunError> {
     let how = (RunKind::LoadSteps, of.moving.has_exact_seam);
     LinearParts::new(of.model, of.operator, of.rest, how, options.ranks)
-}
-
-/// The files of a run, from its beginning or cut back to a checkpoint.
-///
-/// # Errors
-/// [`ObserveError`] for files that cannot be made or cut.
-fn recorder<'a, const D: usize>(
-    (model, rest): (&Model<D>, &'a RunSettings<D>),
-    spec: &Spec,
-    options: &RunOptions<'a>,
-    (impact, breaks): (Option<Arc<Impact<D>>>, Breaks),
-    file: CheckpointFile,
-    saved: Option<&Saved>,
-) -> Result<Recorder<'a, D>, ObserveError> {
-    let peaks = saved.map(|s| &s.written.peaks[..]);
-    let impact = impact.map(|impact| ImpactRecord::new(impact, &rest.impactors, peaks));
-    Recorder::new(
-        &rest.output,
-        &rest.conditions,
-        &Sampler::new(model),
-        impact,
-        breaks,
-        false,
-        file,
-        RunOptions {
-            checkpoint_every: options.checkpoint_every.or(spec.checkpoint_every),
-            ..*options
-        },
-        saved.map(|s| &s.written),
-    )
 }
 
 /// Returns the reason why a resumed run has ended at its checkpoint already; [`Ended::Finished`] if it has not.

@@ -1,13 +1,17 @@
 //! Set-up of every run in time or in load steps: the model, its rows and bonds, and the checkpoint that it goes on from.
 
+use super::breaks::Breaks;
 use super::dynamic_system::{DynamicSystem, LayoutStart, dynamic};
 use super::guard::energies_are_apart;
-use super::saved::Saved;
+use super::impact_record::ImpactRecord;
+use super::saved::{Saved, Written};
 use super::sharing::Sharing;
+use super::writer::Recorder;
 use super::{RunOptions, StartFrom};
 use std::sync::Arc;
 
-use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found};
+use crate::observe::ObserveError;
+use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found, Pace};
 use crate::observe::proof::Proof;
 use crate::observe::summary::{Decision, Stopwatch, Timings, resident_memory_bytes};
 use crate::progress::Progress;
@@ -19,8 +23,8 @@ use crate::scene::spec::CouplingTraits;
 use crate::scene::validated::Scene;
 use crate::system::{Ranks, SemiDiscrete, WithTerms};
 use crate::{
-    coupling::{Operator, Problem},
-    model::Model,
+    coupling::{Impact, Operator, Problem},
+    model::{Model, Sampler},
 };
 
 /// A scene with all that it computes before its first step.
@@ -217,6 +221,34 @@ pub(crate) fn opened<const D: usize>(
     let step = saved.as_ref().map_or(u64::MAX, |saved| saved.state.step);
     setup::same_everywhere(rest, step, options.ranks)?;
     Ok((file, saved))
+}
+
+/// The files of a run, from its beginning or cut back to what was `written` at a checkpoint; the interval between checkpoints is that of the options, or else the one that the scene types.
+///
+/// # Errors
+/// [`ObserveError`] for files that cannot be made or cut.
+pub(crate) fn recorder<'a, const D: usize>(
+    (model, rest): (&Model<D>, &'a RunSettings<D>),
+    (options, typed): (RunOptions<'a>, Option<Pace>),
+    (impact, breaks, is_linear): (Option<Arc<Impact<D>>>, Breaks, bool),
+    file: CheckpointFile,
+    written: Option<&Written>,
+) -> Result<Recorder<'a, D>, ObserveError> {
+    let peaks = written.map(|written| &written.peaks[..]);
+    Recorder::new(
+        &rest.output,
+        &rest.conditions,
+        &Sampler::new(model),
+        impact.map(|impact| ImpactRecord::new(impact, &rest.impactors, peaks)),
+        breaks,
+        is_linear,
+        file,
+        RunOptions {
+            checkpoint_every: options.checkpoint_every.or(typed),
+            ..options
+        },
+        written,
+    )
 }
 
 /// Puts the damage of a checkpoint back.
