@@ -8,9 +8,7 @@ use super::error::SceneError;
 use super::expression::Expression;
 use super::source::Span;
 use super::value::Text;
-use crate::tensor::{Vector, padded};
-
-const AXES: [&str; 3] = ["x", "y", "z"];
+use crate::tensor::{AXES, Vector, padded};
 
 /// A vector field, component by component; components left out are free or zero.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,7 +10,7 @@ use super::source::Span;
 use super::spec::{ImpactorMotionSpec, ImpactorSpec, SceneSpec};
 use super::value::{Coordinates, Text};
 use crate::coupling::ImpactorShape;
-use crate::tensor::Vector;
+use crate::tensor::{AXES, Vector};
 
 /// A rigid body that strikes or presses.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,8 +64,6 @@ const IN_MOTION: f64 = 0.5;
 
 /// Factor in load steps, which have no stable step: sites penetrate by a twentieth of what they would.
 const IN_LOAD_STEPS: f64 = 10.0;
-
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// All impactors.
 pub(crate) fn impactors<const D: usize>(

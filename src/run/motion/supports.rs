@@ -7,8 +7,7 @@ use std::sync::Arc;
 use crate::observe::summary::Reaction;
 use crate::run::condition_terms::ConditionTerms;
 use crate::scene::conditions::{Condition, Prescribed};
-
-const AXES: [&str; 3] = ["x", "y", "z"];
+use crate::tensor::AXES;
 
 /// The conditions that hold something, with the dofs that each holds.
 pub(super) struct Supports<const D: usize> {

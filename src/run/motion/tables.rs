@@ -9,9 +9,7 @@ use crate::run::solution_samples::{SampledSolution, table_header};
 use crate::scene::validated::Output;
 use crate::solve::explicit::State;
 use crate::system::SemiDiscrete;
-use crate::tensor::Vector;
-
-const AXES: [&str; 3] = ["x", "y", "z"];
+use crate::tensor::{AXES, Vector};
 
 /// The tables of a scene's tips and lines, in the order in which it names them.
 pub(super) struct Tables {

@@ -32,9 +32,7 @@ use crate::scene::conditions::Condition;
 use crate::scene::validated::Output;
 use crate::solve::explicit::{Explicit, State};
 use crate::system::SemiDiscrete;
-use crate::tensor::Vector;
-
-const AXES: [&str; 3] = ["x", "y", "z"];
+use crate::tensor::{AXES, Vector};
 
 /// A state to be written.
 pub struct Moment<'a> {

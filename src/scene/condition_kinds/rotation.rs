@@ -12,24 +12,19 @@ use crate::scene::expression::Expression;
 use crate::scene::region::position;
 use crate::scene::spec::ShapeSpec;
 use crate::scene::value::{Coordinates, Text};
-use crate::tensor::{Tensor, Vector};
-
-const AXES: [&str; 3] = ["x", "y", "z"];
+use crate::tensor::{AXES, Tensor, Vector};
 
 /// A rigid rotation: exactly one of `on` and `inside`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RotationSpec {
     /// A named set of the mesh.
-    #[serde(default)]
     pub on: Option<Text>,
     /// All sites inside a shape.
-    #[serde(default)]
     pub inside: Option<ShapeSpec>,
     /// A point of the axis.
     pub center: Coordinates,
     /// Direction of the axis in 3D, of any length; in a plane the axis is z.
-    #[serde(default)]
     pub axis: Option<Coordinates>,
     /// Angle in degrees, right-handed about the axis (counter-clockwise in a plane); may depend on the time.
     pub angle: Expression,

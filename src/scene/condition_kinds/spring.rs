@@ -25,31 +25,23 @@ use crate::scene::region::Region;
 use crate::scene::spec::ShapeSpec;
 use crate::scene::value::{Number, Text};
 use crate::system::{ForceTerm, SpringRows};
-use crate::tensor::{Tensor, Vector};
-
-const AXES: [&str; 3] = ["x", "y", "z"];
+use crate::tensor::{AXES, Tensor, Vector};
 
 /// Springs to the ground: exactly one of `on` and `inside`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct SpringSpec {
     /// A named set of facets of the mesh; stiffnesses are forces per area and displacement.
-    #[serde(default)]
     pub on: Option<Text>,
     /// The cells of the mesh with their centroid in a shape; stiffnesses are forces per volume and displacement.
-    #[serde(default)]
     pub inside: Option<ShapeSpec>,
     /// Stiffness along x.
-    #[serde(default)]
     pub x: Option<Number>,
     /// Stiffness along y.
-    #[serde(default)]
     pub y: Option<Number>,
     /// Stiffness along z.
-    #[serde(default)]
     pub z: Option<Number>,
     /// Stiffness along the normal of the set, instead of components.
-    #[serde(default)]
     pub normal: Option<Number>,
 }
 
