@@ -17,16 +17,12 @@ use crate::scene::spec::ShapeSpec;
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct BodyForceSpec {
     /// Region of the force; everywhere if left out.
-    #[serde(default)]
     pub inside: Option<ShapeSpec>,
     /// Force along x.
-    #[serde(default)]
     pub x: Option<Expression>,
     /// Force along y.
-    #[serde(default)]
     pub y: Option<Expression>,
     /// Force along z.
-    #[serde(default)]
     pub z: Option<Expression>,
 }
 

@@ -18,13 +18,10 @@ pub struct TractionSpec {
     /// A named set of facets of the mesh.
     pub on: Text,
     /// Traction along x.
-    #[serde(default)]
     pub x: Option<Expression>,
     /// Traction along y.
-    #[serde(default)]
     pub y: Option<Expression>,
     /// Traction along z.
-    #[serde(default)]
     pub z: Option<Expression>,
 }
 

@@ -18,19 +18,14 @@ use crate::scene::value::Text;
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct VelocitySpec {
     /// A named set of the mesh. Where peridynamics meets the set, points within three quarters of their spacing of it follow it: the first layer.
-    #[serde(default)]
     pub on: Option<Text>,
     /// All sites inside a shape.
-    #[serde(default)]
     pub inside: Option<ShapeSpec>,
     /// Velocity along x.
-    #[serde(default)]
     pub x: Option<Expression>,
     /// Velocity along y.
-    #[serde(default)]
     pub y: Option<Expression>,
     /// Velocity along z.
-    #[serde(default)]
     pub z: Option<Expression>,
 }
 

@@ -13,7 +13,6 @@ use crate::peridynamics::LinearForceState;
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct TruncatedSpec {
     /// Treatment of cut bonds where bonds are exact or break; `breaking` if left out, `linear` beside a zone that follows its crack.
-    #[serde(default)]
     pub cut_bonds: Option<CutBonds>,
 }
 

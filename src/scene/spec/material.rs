@@ -149,35 +149,27 @@ impl MaterialSpec {
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct PeridynamicsSpec {
     /// Horizon δ: a number, or an expression in x, y, z; three spacings of the points if left out, where no bond breaks.
-    #[serde(default)]
     pub horizon: Option<Expression>,
     /// Bond weights.
     #[serde(default)]
     pub weights: BondWeights,
     /// Partial volume of a cell that the horizon cuts (SAND2015-7998 section 5.2.1); all but "full" need `points.lattice`.
-    #[serde(default)]
     #[schemars(with = "Option<PartialVolume>")]
     pub volumes: Option<toml::Spanned<PartialVolume>>,
     /// Influence function of state-based laws; `{ degree = 3, alpha = 0 }` if left out.
-    #[serde(default)]
     pub influence: Option<InfluenceSpec>,
     /// Positions of the points; a lattice if left out, as fine as the cells of the zone where they are alike, else a third of the horizon.
-    #[serde(default)]
     pub points: Option<PointsSpec>,
     /// Dependence of the bond force on the displacement; "linear" without damage and "exact" with it if left out.
-    #[serde(default)]
     #[schemars(with = "Option<BondKinematics>")]
     pub bonds: Option<toml::Spanned<BondKinematics>>,
     /// Constitutive law of the finite elements of the points' materials; "linear" if left out.
-    #[serde(default)]
     #[schemars(with = "Option<super::motion::ElementsSpec>")]
     pub elements: Option<toml::Spanned<super::motion::ElementsSpec>>,
     /// Storage of the weights of bonds in scenes in time and load steps; "double" if left out.
-    #[serde(default)]
     #[schemars(with = "Option<Storage>")]
     pub precision: Option<toml::Spanned<Storage>>,
     /// Calibration of the critical stretch to a fracture energy; "lattice" if left out.
-    #[serde(default)]
     #[schemars(with = "Option<super::motion::CalibrationSpec>")]
     pub calibration: Option<toml::Spanned<super::motion::CalibrationSpec>>,
     /// Treatment of bonds across the mesh's own boundary (a hole, a notch); "cut" if left out.
@@ -211,6 +203,5 @@ pub struct LatticeSpec {
     pub spacing: Number,
     /// Any point of the lattice; the mesh's lowest corner if left out, so that points coincide with the nodes of a
     /// mesh of the same spacing; with the coupling `truncated` half a spacing inside of that corner.
-    #[serde(default)]
     pub origin: Option<Coordinates>,
 }

@@ -14,13 +14,10 @@ pub struct MaterialInterfaceSpec {
     /// The names of the two materials.
     pub between: Vec<Text>,
     /// The stiffness of these bonds, of laws whose bonds act alone; "harmonic-mean" if left out.
-    #[serde(default)]
     #[schemars(with = "Option<StiffnessMean>")]
     pub stiffness: Option<Spanned<StiffnessMean>>,
     /// Energy per area of a crack along the interface, from which the critical stretch of these bonds follows.
-    #[serde(default)]
     pub fracture_energy: Option<Number>,
     /// Stretch at which these bonds break, instead of `fracture-energy`.
-    #[serde(default)]
     pub critical_stretch: Option<Number>,
 }

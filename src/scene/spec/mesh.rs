@@ -134,10 +134,8 @@ pub struct GradedSpec {
     /// Cell size in the fine interval.
     pub spacing: Number,
     /// Ratio of neighbouring cell sizes outside, at least 1.
-    #[serde(default)]
     pub growth: Option<Number>,
     /// The largest cell size.
-    #[serde(default)]
     pub largest: Option<Number>,
 }
 

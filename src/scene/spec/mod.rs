@@ -79,7 +79,6 @@ pub struct SceneSpec {
     #[serde(default)]
     pub title: Option<String>,
     /// The relative error that is wanted, 0.01 for 1 %: coupling, mesh, horizon, points and zone, as far as the scene leaves them out, are chosen for it.
-    #[serde(default)]
     pub accuracy: Option<Number>,
     /// Kinematic assumption by which the body represents a three-dimensional solid; fixes the dimension.
     #[schemars(with = "Kinematics")]
@@ -92,7 +91,6 @@ pub struct SceneSpec {
     #[serde(default)]
     pub interfaces: BTreeMap<Text, MaterialInterfaceSpec>,
     /// Horizon, points and weights of the peridynamic region; needed unless the coupling is `local`.
-    #[serde(default)]
     pub peridynamics: Option<PeridynamicsSpec>,
     /// Nonlocal zone of the body, and transition zone where the two models overlap; all else is local. With "auto" the program places the zone.
     #[serde(default)]
@@ -113,7 +111,6 @@ pub struct SceneSpec {
     #[serde(default)]
     pub tables: BTreeMap<Text, TableSpec>,
     /// Temperature of the body; without it nothing expands.
-    #[serde(default)]
     pub temperature: Option<TemperatureSpec>,
     /// Displacements and velocities at time zero by name; at rest where none says otherwise.
     #[serde(default)]
@@ -128,7 +125,6 @@ pub struct SceneSpec {
     #[serde(default)]
     pub no_fail: BTreeMap<Text, ShapeSpec>,
     /// Short-range contact; none if left out.
-    #[serde(default)]
     pub contact: Option<ContactSpec>,
     /// Rigid bodies that strike or press, by name; scenes in time and load steps.
     #[serde(default)]

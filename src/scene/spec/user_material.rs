@@ -14,23 +14,19 @@ pub struct UmatSpec {
     /// The library, relative to the scene; its code runs within the program.
     pub library: Text,
     /// The routine's name in the library; `umat_`, `umat` or `UMAT` if left out.
-    #[serde(default)]
     pub symbol: Option<Text>,
     /// Young's modulus E at rest.
     pub youngs_modulus: Number,
     /// Poisson's ratio at rest.
     pub poisson_ratio: Number,
     /// Density.
-    #[serde(default)]
     pub density: Option<Number>,
     /// Linear thermal expansion α per degree, with `[temperature]`: the routine gets the strain that is left.
-    #[serde(default)]
     pub thermal_expansion: Option<Number>,
     /// PROPS, the numbers that the routine takes.
     #[serde(default)]
     pub constants: Vec<Number>,
     /// NSTATV, the number of history variables of a point; 0 if left out.
-    #[serde(default)]
     pub state: Option<Count>,
     /// Admissible magnitude of strains and rotations.
     #[serde(default)]
@@ -48,22 +44,17 @@ pub struct UmatSpec {
     #[serde(default)]
     pub mean_dilatation: Option<bool>,
     /// TEMP; 0 if left out.
-    #[serde(default)]
     pub temperature: Option<Number>,
     /// CELENT; not a number if left out.
-    #[serde(default)]
     pub element_length: Option<Number>,
     /// Strength of the zero-energy control relative to the bonds of an LPS; 1 if left out, 0 switches it off.
-    #[serde(default)]
     pub stabilisation: Option<Number>,
     /// Resistance to deformations that are not uniform: a bond force, one by the lengths of bonds alone, or a drag (in explicit dynamics).
     #[serde(default)]
     pub zero_energy_control: ControlSpec,
     /// Stretch at which a bond breaks.
-    #[serde(default)]
     pub critical_stretch: Option<Number>,
     /// The cells that this material fills: the name of a set, or a shape that holds their centroids.
-    #[serde(default)]
     pub cells: Option<CellsSpec>,
 }
 
