@@ -19,7 +19,7 @@ use crate::observe::checkpoint::{CheckpointFile, Pace};
 use crate::observe::csv::{CsvTable, Entry};
 use crate::observe::pieces::agreed;
 use crate::observe::series::Series;
-use crate::observe::summary::{Reaction, SectionForce};
+use crate::observe::summary::{ConditionForce, SectionForce};
 use crate::run::condition_terms::ConditionTerms;
 use crate::run::error::RunError;
 use crate::run::field_probes;
@@ -205,7 +205,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
     }
 
     /// The forces of the conditions that hold, at the last row.
-    pub fn reactions(&self) -> Vec<Reaction> {
+    pub fn reactions(&self) -> Vec<ConditionForce> {
         self.supports.reactions()
     }
 
