@@ -184,8 +184,6 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
         why,
     });
     let tensors = scene.materials.iter().map(|m| m.stiffness()).collect();
-    let local = |m: &Material<D>| m.law.local_law().filter(|law| !law.is_linear());
-    let local_laws = scene.materials.iter().map(local).collect();
     let density = scene.materials.iter().map(|m| m.density).collect();
     let (voids, barriers) = (scene.voids, scene.barriers);
     let peridynamics = scene.peridynamics.map(|p| model::Peridynamics {
@@ -223,7 +221,7 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
             follow: scene.follow,
             fingerprint: scene.fingerprint,
             elements: scene.elements,
-            local_laws,
+            local_laws: stresses.local_laws.clone(),
             materials: scene.materials,
             density,
             stresses,
