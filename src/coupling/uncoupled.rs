@@ -9,13 +9,17 @@ use crate::{
     system::Symmetry,
 };
 
-/// Declares a coupling whose cells all have one role.
-macro_rules! everywhere {
-    ($(#[$about:meta])* $method:ident, $name:literal, $role:ident { $($more:tt)* }) => {
-        $(#[$about])*
-        #[derive(Clone, Copy, Debug, Default)]
-        pub struct $method;
+/// Finite elements everywhere.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Local;
 
+/// Peridynamics everywhere.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Nonlocal;
+
+/// Implements a coupling whose cells all have one role.
+macro_rules! everywhere {
+    ($method:ident, $name:literal, $role:ident { $($more:tt)* }) => {
         impl<const D: usize> ZoneLayout<D> for $method {
             fn name(&self) -> &'static str {
                 $name
@@ -52,13 +56,9 @@ macro_rules! everywhere {
     };
 }
 
-everywhere! {
-    /// Finite elements everywhere.
-    Local, "local", Element {}
-}
+everywhere!(Local, "local", Element {});
 
 everywhere! {
-    /// Peridynamics everywhere.
     Nonlocal, "nonlocal", Points {
         fn families_of_all(&self, _law: &dyn LinearForceState<D>) -> Option<usize> {
             Some(0)

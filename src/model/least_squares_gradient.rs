@@ -174,7 +174,7 @@ pub fn fit<const D: usize>(
     Some((0..data.len()).map(|r| inverse[(0, r)] * w[r]).collect())
 }
 
-/// Degree of a least-squares fit.
+/// Order of the constraint where mesh and points meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[schemars(rename = "InterfaceSpec")]

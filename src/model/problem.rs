@@ -115,7 +115,7 @@ impl<const D: usize> Peridynamics<D> {
     }
 }
 
-/// Treatment of bonds that cross the boundary of the mesh.
+/// Treatment of bonds across the boundary of the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[schemars(rename = "SurfacesSpec")]

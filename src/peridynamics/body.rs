@@ -20,7 +20,7 @@ use crate::{
     tensor::{Tensor, Tensor4, Vector},
 };
 
-/// Weights of bonds relative to the plain kernel.
+/// Weights of bonds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[schemars(rename = "WeightsSpec")]

@@ -31,7 +31,7 @@ pub use sampling::{SAND_LEVELS, SAND_SAMPLES_PER_EDGE, subdivide_and_sample};
 
 use crate::tensor::Vector;
 
-/// An algorithm for the quadrature weight `V_j^(i)` of a bond, as a share of the volume of the cell of its far point.
+/// Partial volumes of the cells that the horizon cuts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[schemars(rename = "VolumesSpec")]
