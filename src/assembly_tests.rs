@@ -64,7 +64,8 @@ fn a_place_is_the_sum_of_its_weights() {
 #[test]
 fn rows_are_sorted_summed_and_reused() {
     let transfer = Transfer::from_rows(6, [vec![(5, 0.5), (1, 0.5)]]);
-    let matrix = assemble::<2>(
+    let matrix = assemble_rows::<2>(
+        600,
         600,
         |_| {},
         |site, row| {

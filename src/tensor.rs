@@ -8,6 +8,9 @@ pub type Vector<const D: usize> = SVector<f64, D>;
 /// A second-order tensor of `D × D` components.
 pub type Tensor<const D: usize> = SMatrix<f64, D, D>;
 
+/// Names of the axes.
+pub const AXES: [&str; 3] = ["x", "y", "z"];
+
 /// A fourth-order tensor `C_ijkl`, stored as `D × D` second-order tensors `[i][j](k, l)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tensor4<const D: usize>(pub [[Tensor<D>; D]; D]);

@@ -342,7 +342,8 @@ fn no_toml() {
 
 #[test]
 fn overrides() {
-    use bondline::scene::spec::{BetaSpec, CouplingSpec};
+    use bondline::coupling::BlendingFunction;
+    use bondline::scene::spec::CouplingSpec;
     let spec = parse(
         RIGHT,
         &[
@@ -358,7 +359,7 @@ fn overrides() {
     );
     assert_eq!(spec.title.as_deref(), Some("My plate"));
     assert!(
-        matches!(spec.coupling.unwrap().into_inner(), CouplingSpec::Blending(b) if b.beta == BetaSpec::Smooth)
+        matches!(spec.coupling.unwrap().into_inner(), CouplingSpec::Blending(b) if b.beta == BlendingFunction::Smooth)
     );
     for choice in [
         "coupling=splice",
@@ -374,7 +375,7 @@ fn overrides() {
     // a second override sees the first
     let spec = parse(RIGHT, &["coupling=splice", "coupling.blending.beta=linear"]).unwrap();
     assert!(
-        matches!(spec.coupling.unwrap().into_inner(), CouplingSpec::Blending(b) if b.beta == BetaSpec::Linear)
+        matches!(spec.coupling.unwrap().into_inner(), CouplingSpec::Blending(b) if b.beta == BlendingFunction::Linear)
     );
     let spec = parse(
         RIGHT,

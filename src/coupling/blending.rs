@@ -18,17 +18,17 @@ use crate::{
     tensor::{Tensor, Vector},
 };
 
-/// The blending function `β̂` of the blending region, from 0 at its local side to 1 at its peridynamic side.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
-)]
+/// Shape of the blending function.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[schemars(rename = "BetaSpec")]
 pub enum BlendingFunction {
-    /// `β̂ = ½`, as in [SAND2015-7998] section 3.4.
+    /// One half throughout the transition zone.
     Constant,
-    /// Linear in the distance across the region.
+    /// Straight.
     Linear,
-    /// The cubic `3 s² − 2 s³` of the relative distance `s`: flat at both sides.
+    /// The cubic `3 s² - 2 s³`.
+    #[default]
     Smooth,
 }
 

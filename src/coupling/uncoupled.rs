@@ -17,75 +17,56 @@ pub struct Local;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Nonlocal;
 
-impl<const D: usize> ZoneLayout<D> for Local {
-    fn name(&self) -> &'static str {
-        "local"
-    }
+/// Implements a coupling whose cells all have one role.
+macro_rules! everywhere {
+    ($method:ident, $name:literal, $role:ident { $($more:tt)* }) => {
+        impl<const D: usize> ZoneLayout<D> for $method {
+            fn name(&self) -> &'static str {
+                $name
+            }
 
-    fn interface(&self) -> Interface {
-        Interface::OVERLAP
-    }
+            fn interface(&self) -> Interface {
+                Interface::OVERLAP
+            }
 
-    fn symmetry(&self) -> Symmetry {
-        Symmetry::Symmetric
-    }
+            fn symmetry(&self) -> Symmetry {
+                Symmetry::Symmetric
+            }
 
-    fn roles(&self, mesh: &Mesh<D>, _zones: &[Zone], _largest_horizon: f64) -> Vec<CellRole> {
-        vec![CellRole::Element; mesh.cell_count()]
-    }
+            fn roles(&self, mesh: &Mesh<D>, _zones: &[Zone], _horizon: f64) -> Vec<CellRole> {
+                vec![CellRole::$role; mesh.cell_count()]
+            }
 
-    fn reach(&self, law: &dyn LinearForceState<D>) -> Reach {
-        Reach::of_bond_forces(law)
-    }
+            fn reach(&self, law: &dyn LinearForceState<D>) -> Reach {
+                Reach::of_bond_forces(law)
+            }
 
-    fn takes_deviators(&self) -> bool {
-        true
-    }
+            fn takes_deviators(&self) -> bool {
+                true
+            }
+
+            $($more)*
+        }
+
+        impl<const D: usize> Coupling<D> for $method {
+            fn operator<'a>(&self, model: &'a Model<D>) -> Result<Operator<'a, D>, ModelError> {
+                Ok(own_model(model))
+            }
+        }
+    };
 }
 
-impl<const D: usize> Coupling<D> for Local {
-    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Operator<'a, D>, ModelError> {
-        Ok(own_model(model))
-    }
-}
+everywhere!(Local, "local", Element {});
 
-impl<const D: usize> ZoneLayout<D> for Nonlocal {
-    fn name(&self) -> &'static str {
-        "nonlocal"
-    }
+everywhere! {
+    Nonlocal, "nonlocal", Points {
+        fn families_of_all(&self, _law: &dyn LinearForceState<D>) -> Option<usize> {
+            Some(0)
+        }
 
-    fn interface(&self) -> Interface {
-        Interface::OVERLAP
-    }
-
-    fn symmetry(&self) -> Symmetry {
-        Symmetry::Symmetric
-    }
-
-    fn roles(&self, mesh: &Mesh<D>, _zones: &[Zone], _largest_horizon: f64) -> Vec<CellRole> {
-        vec![CellRole::Points; mesh.cell_count()]
-    }
-
-    fn reach(&self, law: &dyn LinearForceState<D>) -> Reach {
-        Reach::of_bond_forces(law)
-    }
-
-    fn takes_deviators(&self) -> bool {
-        true
-    }
-
-    fn families_of_all(&self, _law: &dyn LinearForceState<D>) -> Option<usize> {
-        Some(0)
-    }
-
-    fn moves_with_own_families(&self) -> bool {
-        true
-    }
-}
-
-impl<const D: usize> Coupling<D> for Nonlocal {
-    fn operator<'a>(&self, model: &'a Model<D>) -> Result<Operator<'a, D>, ModelError> {
-        Ok(own_model(model))
+        fn moves_with_own_families(&self) -> bool {
+            true
+        }
     }
 }
 

@@ -60,17 +60,28 @@ use std::sync::Arc;
 
 use crate::tensor::{Tensor, Tensor4, principal_values};
 
-/// Kinematics by which a body of `D` dimensions stands for a solid of three.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+/// Kinematic assumption by which a body of one, two or three dimensions represents a solid.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    Hash,
+    serde::Serialize,
+    serde::Deserialize,
+    schemars::JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
+#[schemars(rename = "KinematicsSpec")]
 pub enum Kinematics {
-    /// 1D: uniaxial stress, the sides are free to contract.
+    /// One dimension: uniaxial stress.
     Bar,
-    /// 2D: no stress out of the plane (a thin plate).
+    /// Two dimensions: a thin plate.
     PlaneStress,
-    /// 2D: no strain out of the plane (a long body).
+    /// Two dimensions: a long body.
     PlaneStrain,
-    /// 3D.
+    /// Three dimensions.
     Solid,
 }
 

@@ -5,12 +5,15 @@ use std::sync::{Arc, OnceLock};
 
 use super::LocalLaw;
 
-/// Source of the energies of a routine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Source of the energies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(rename = "EnergiesSpec")]
 pub enum UmatEnergies {
-    /// Stored is the elastic energy of the stress, `½ σ : C⁻¹ : σ`; what else was worked is dissipated.
+    /// The stress: stored is its elastic energy, the rest of the work is dissipated.
+    #[default]
     Stress,
-    /// Stored is `SSE`; dissipated is what `SPD` and `SCD` grow by.
+    /// The routine: SSE, SPD and SCD.
     Routine,
 }
 

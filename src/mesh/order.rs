@@ -5,13 +5,15 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use super::{Facet, Mesh};
 use crate::tensor::Vector;
 
-/// Treatment of cells of second order that are read.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// The order of the cells of a mesh from a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(rename = "FileOrderSpec")]
 pub enum Order {
-    /// They stay as they are.
+    /// As the file has them.
     #[default]
     Kept,
-    /// They become linear: nodes in the middle of edges are left out.
+    /// Linear: nodes in the middle of edges are left out.
     Linear,
 }
 

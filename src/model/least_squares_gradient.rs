@@ -174,15 +174,15 @@ pub fn fit<const D: usize>(
     Some((0..data.len()).map(|r| inverse[(0, r)] * w[r]).collect())
 }
 
-/// Degree of a least-squares fit.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
-)]
+/// Order of the constraint where mesh and points meet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[schemars(rename = "InterfaceSpec")]
 pub enum FitDegree {
-    /// Reproduces affine fields.
+    /// Affine fields pass exactly.
     Affine,
-    /// Reproduces quadratic fields, as in the report.
+    /// Quadratic fields pass exactly.
+    #[default]
     Quadratic,
 }
 

@@ -115,15 +115,15 @@ impl<const D: usize> Peridynamics<D> {
     }
 }
 
-/// Treatment of bonds that cross the boundary of the mesh.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
-)]
+/// Treatment of bonds across the boundary of the mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[schemars(rename = "SurfacesSpec")]
 pub enum Surfaces {
-    /// They are cut.
+    /// Bonds that leave the body are cut.
+    #[default]
     Cut,
-    /// They are kept.
+    /// Bonds reach across holes.
     Uncut,
 }
 

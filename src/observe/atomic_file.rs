@@ -33,10 +33,7 @@ pub fn write_whole(
 ) -> Result<(), ObserveError> {
     static SERIAL: AtomicU64 = AtomicU64::new(0);
     create_parent(path)?;
-    let fail = |source| ObserveError::Write {
-        path: path.to_path_buf(),
-        source,
-    };
+    let fail = ObserveError::write(path);
     let Some(name) = path.file_name() else {
         return Err(fail(std::io::ErrorKind::IsADirectory.into()));
     };

@@ -129,10 +129,7 @@ impl Claim {
             .collect();
         let mut claim = Self { held: None, made };
         let path = folder.join(format!(".{}.lock", files.name));
-        let fail = |source| ObserveError::Write {
-            path: path.clone(),
-            source,
-        };
+        let fail = ObserveError::write(&path);
         let mut looks = 0;
         let mut file = loop {
             // another run that ends may remove the folder with its claim
@@ -146,7 +143,7 @@ impl Claim {
                     looks += 1;
                     continue;
                 }
-                opened => opened.map_err(fail)?,
+                opened => opened.map_err(&fail)?,
             };
             match file.try_lock() {
                 Ok(()) if is_at(&file, &path) => break file,

@@ -1,7 +1,7 @@
 //! Tables of numbers that grow row by row: values along a line, at probes, over steps.
 
 use std::fs::File;
-use std::io::{BufWriter, Seek, SeekFrom, Write};
+use std::io::{BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::ObserveError;
@@ -37,51 +37,51 @@ impl From<&str> for Entry {
     }
 }
 
-/// A table on disk: each row is there as soon as it is written, so that a run can be watched and nothing is lost when it
-/// stops.
+/// A table that is made with its first row, or before. Each row is on disk as soon as it is known, so that a run can be watched and nothing is lost when it
+/// stops; a run that goes on cuts off the rows after its checkpoint.
 #[derive(Debug)]
 pub struct CsvTable {
     path: PathBuf,
-    out: BufWriter<File>,
     header: Vec<String>,
+    out: Option<BufWriter<File>>,
     rows: usize,
 }
 
 impl CsvTable {
+    fn of(path: &Path, header: Vec<String>, out: Option<File>) -> Self {
+        Self {
+            path: path.to_path_buf(),
+            header,
+            out: out.map(BufWriter::new),
+            rows: 0,
+        }
+    }
+
     /// Makes the file (and its folder) and writes the header.
     ///
     /// # Errors
     /// [`ObserveError::Empty`] without columns, [`ObserveError::Folder`], [`ObserveError::Write`].
     pub fn create(path: &Path, header: &[&str]) -> Result<Self, ObserveError> {
-        has_columns(path, header)?;
-        create_parent(path)?;
-        let file = regular_file::may_be_written(path)
-            .and_then(|()| File::create(path))
-            .map_err(|source| ObserveError::Write {
-                path: path.to_path_buf(),
-                source,
-            })?;
-        let mut table = Self {
-            path: path.to_path_buf(),
-            out: BufWriter::new(file),
-            header: header.iter().map(|&h| h.to_owned()).collect(),
-            rows: 0,
-        };
-        table.line(&first_line(header))?;
+        let header = header.iter().map(|&h| h.to_owned()).collect();
+        let mut table = Self::of(path, header, None);
+        table.begin()?;
         Ok(table)
     }
 
-    /// Goes on with a table of which the first `bytes` stand; what follows them is cut off.
+    /// A table of which the first `bytes` stand; what follows them goes.
     ///
     /// # Errors
-    /// [`ObserveError::Write`], or [`ObserveError::Shortened`] if the file holds less.
-    pub fn resume(path: &Path, header: &[&str], bytes: u64) -> Result<Self, ObserveError> {
-        let fail = |source| ObserveError::Write {
-            path: path.to_path_buf(),
-            source,
-        };
-        let mut file = regular_file::open(path, File::options().write(true)).map_err(fail)?;
-        let found = file.metadata().map_err(fail)?.len();
+    /// [`ObserveError::Write`] if the file cannot be removed, opened or cut, [`ObserveError::Shortened`] if it holds less.
+    pub fn resumed(path: &Path, header: Vec<String>, bytes: u64) -> Result<Self, ObserveError> {
+        if bytes == 0 {
+            return match std::fs::remove_file(path) {
+                Err(e) if e.kind() != ErrorKind::NotFound => Err(ObserveError::write(path)(e)),
+                _ => Ok(Self::of(path, header, None)),
+            };
+        }
+        let fail = ObserveError::write(path);
+        let mut file = regular_file::open(path, File::options().write(true)).map_err(&fail)?;
+        let found = file.metadata().map_err(&fail)?.len();
         if found < bytes {
             return Err(ObserveError::Shortened {
                 path: path.to_path_buf(),
@@ -89,69 +89,82 @@ impl CsvTable {
                 found,
             });
         }
-        file.set_len(bytes).map_err(fail)?;
-        file.seek(SeekFrom::End(0)).map_err(fail)?;
-        Ok(Self {
-            path: path.to_path_buf(),
-            out: BufWriter::new(file),
-            header: header.iter().map(|&h| h.to_owned()).collect(),
-            rows: 0,
-        })
+        file.set_len(bytes).map_err(&fail)?;
+        file.seek(SeekFrom::End(0)).map_err(&fail)?;
+        Ok(Self::of(path, header, Some(file)))
     }
 
-    /// Forces all rows to the disk; returns the length of the file.
+    /// A table of these columns without a file, which takes no rows.
+    pub fn unwritten(header: Vec<String>) -> Self {
+        Self::of(Path::new(""), header, None)
+    }
+
+    /// Makes the table, if it is not there, so that it has its header also where no row follows.
+    ///
+    /// # Errors
+    /// As [`CsvTable::create`].
+    pub fn begin(&mut self) -> Result<(), ObserveError> {
+        if self.is_begun() {
+            return Ok(());
+        }
+        has_columns(&self.path, &self.header)?;
+        create_parent(&self.path)?;
+        let file = regular_file::may_be_written(&self.path)
+            .and_then(|()| File::create(&self.path))
+            .map_err(ObserveError::write(&self.path))?;
+        self.out = Some(BufWriter::new(file));
+        self.line(&first_line(&self.header))
+    }
+
+    /// Forces all rows to the disk; returns the length of the file, zero before it is begun.
     ///
     /// # Errors
     /// [`ObserveError::Write`].
     pub fn mark(&self) -> Result<u64, ObserveError> {
-        let file = self.out.get_ref();
+        let Some(file) = self.out.as_ref().map(BufWriter::get_ref) else {
+            return Ok(0);
+        };
         file.sync_data()
             .and_then(|()| file.metadata())
             .map(|m| m.len())
-            .map_err(|source| ObserveError::Write {
-                path: self.path.clone(),
-                source,
-            })
-    }
-
-    /// Appends a row of numbers.
-    ///
-    /// # Errors
-    /// As [`CsvTable::entries`].
-    pub fn row(&mut self, values: &[f64]) -> Result<(), ObserveError> {
-        let entries: Vec<Entry> = values.iter().map(|&v| v.into()).collect();
-        self.entries(&entries)
+            .map_err(ObserveError::write(&self.path))
     }
 
     /// Appends a row.
     ///
     /// # Errors
-    /// [`ObserveError::RowLength`], [`ObserveError::NotFinite`] (the column is named) or [`ObserveError::Write`]; nothing
+    /// As [`CsvTable::create`], [`ObserveError::RowLength`], [`ObserveError::NotFinite`] (the column is named) or [`ObserveError::Write`]; nothing
     /// of the row is then written, except on a full disk.
     pub fn entries(&mut self, entries: &[Entry]) -> Result<(), ObserveError> {
+        self.begin()?;
         let line = line_of(&self.path, &self.header, self.rows, entries)?;
         self.line(&line)?;
         self.rows += 1;
         Ok(())
     }
 
-    /// Rows written since the table was made or resumed, the header not counted.
-    pub fn rows(&self) -> usize {
-        self.rows
+    /// The columns.
+    pub fn header(&self) -> &[String] {
+        &self.header
     }
 
-    /// Path of the table.
+    /// Path of the table, once it is begun.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
+    /// Returns true if the table exists.
+    pub fn is_begun(&self) -> bool {
+        self.out.is_some()
+    }
+
     fn line(&mut self, text: &str) -> Result<(), ObserveError> {
-        writeln!(self.out, "{text}")
-            .and_then(|()| self.out.flush())
-            .map_err(|source| ObserveError::Write {
-                path: self.path.clone(),
-                source,
-            })
+        let Some(out) = &mut self.out else {
+            return Ok(());
+        };
+        writeln!(out, "{text}")
+            .and_then(|()| out.flush())
+            .map_err(ObserveError::write(&self.path))
     }
 }
 
@@ -164,23 +177,20 @@ pub fn write_table(
     header: &[&str],
     rows: impl Iterator<Item = Vec<f64>>,
 ) -> Result<(), ObserveError> {
-    has_columns(path, header)?;
-    let columns: Vec<String> = header.iter().map(|&h| h.to_owned()).collect();
-    let mut text = first_line(header);
+    let header: Vec<String> = header.iter().map(|&h| h.to_owned()).collect();
+    has_columns(path, &header)?;
+    let mut text = first_line(&header);
     text.push('\n');
     for (number, row) in rows.enumerate() {
         let entries: Vec<Entry> = row.into_iter().map(Entry::Real).collect();
-        text.push_str(&line_of(path, &columns, number, &entries)?);
+        text.push_str(&line_of(path, &header, number, &entries)?);
         text.push('\n');
     }
-    regular_file::may_be_written(path).map_err(|source| ObserveError::Write {
-        path: path.to_path_buf(),
-        source,
-    })?;
+    regular_file::may_be_written(path).map_err(ObserveError::write(path))?;
     write_whole(path, |file| file.write_all(text.as_bytes()))
 }
 
-fn has_columns(path: &Path, header: &[&str]) -> Result<(), ObserveError> {
+fn has_columns(path: &Path, header: &[String]) -> Result<(), ObserveError> {
     if header.is_empty() {
         return Err(ObserveError::Empty {
             path: path.to_path_buf(),
@@ -190,7 +200,7 @@ fn has_columns(path: &Path, header: &[&str]) -> Result<(), ObserveError> {
     Ok(())
 }
 
-fn first_line(header: &[&str]) -> String {
+fn first_line(header: &[String]) -> String {
     let names: Vec<String> = header.iter().map(|h| quoted(h)).collect();
     names.join(",")
 }
@@ -267,7 +277,6 @@ mod tests {
             assert_eq!(words[0].parse::<f64>().unwrap().to_bits(), v.to_bits());
             assert_eq!(words[1..], [&i.to_string(), "local"]);
         }
-        assert_eq!(table.rows(), values.len());
     }
 
     #[test]
@@ -275,12 +284,15 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("line.csv");
         let mut table = CsvTable::create(&path, &["x", "u"]).unwrap();
-        let error = table.row(&[1.0]).unwrap_err().to_string();
+        let error = table.entries(&[1.0.into()]).unwrap_err().to_string();
         assert!(
             error.contains("1 entries where its header has 2"),
             "{error}"
         );
-        let error = table.row(&[1.0, f64::NAN]).unwrap_err().to_string();
+        let error = table
+            .entries(&[1.0.into(), f64::NAN.into()])
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("`u`") && error.contains("NaN"), "{error}");
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "x,u\n");
         assert!(CsvTable::create(&path, &[]).is_err());
@@ -288,6 +300,40 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(error.contains("is a folder"), "{error}");
+    }
+
+    fn header() -> Vec<String> {
+        vec!["step".to_owned(), "energy".to_owned()]
+    }
+
+    #[test]
+    fn rows_after_the_mark_go_and_come_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run_history.csv");
+        let row = |history: &mut CsvTable, k: i64| {
+            history
+                .entries(&[k.into(), (0.1 * k as f64).into()])
+                .unwrap();
+        };
+        let mut history = CsvTable::resumed(&path, header(), 0).unwrap();
+        assert!(!history.is_begun() && !path.exists());
+        assert_eq!(history.mark().unwrap(), 0);
+        (0..3).for_each(|k| row(&mut history, k));
+        let mark = history.mark().unwrap();
+        (3..6).for_each(|k| row(&mut history, k));
+        let whole = std::fs::read(&path).unwrap();
+        drop(history);
+        // killed in the middle of a row
+        std::fs::write(&path, &whole[..whole.len() - 4]).unwrap();
+        let mut history = CsvTable::resumed(&path, header(), mark).unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 4);
+        (3..6).for_each(|k| row(&mut history, k));
+        assert_eq!(std::fs::read(&path).unwrap(), whole);
+        drop(history);
+        let error = CsvTable::resumed(&path, header(), 10_000).unwrap_err();
+        assert!(matches!(error, ObserveError::Shortened { .. }), "{error}");
+        let history = CsvTable::resumed(&path, header(), 0).unwrap();
+        assert!(!history.is_begun() && !path.exists());
     }
 
     #[cfg(target_os = "linux")]

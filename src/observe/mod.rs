@@ -6,10 +6,9 @@
 //! | `data_array.rs` | numbers as text of a VTK XML file |
 //! | `pieces.rs` | one VTU of each of several processes, and a PVTU over them |
 //! | `series.rs` | VTU files over time and their PVD |
-//! | `history.rs` | tables that grow with a run, and are cut where it resumes |
 //! | `checkpoint.rs` | the state of a run, whole or not at all |
 //! | `claim.rs` | claims on a folder, so that no two runs write the same files |
-//! | `csv.rs` | values along a line or at probes, row by row |
+//! | `csv.rs` | values along a line, at probes or over steps, row by row; tables that grow with a run are cut where it resumes |
 //! | `report.rs` | rows with a verdict, their table for people and their JSON |
 //! | `summary.rs`, `motion_summary.rs` | summary of one run: sizes, choices, timings, balance; energies over time |
 //! | `cracks.rs` | energy and area of broken bonds, in a summary |
@@ -25,7 +24,6 @@ pub mod claim;
 pub mod cracks;
 pub mod csv;
 mod data_array;
-pub mod history;
 mod motion_summary;
 mod observer;
 pub mod pieces;
@@ -173,6 +171,14 @@ pub enum ObserveError {
 }
 
 impl ObserveError {
+    /// The error of a file that the operating system does not write.
+    pub(super) fn write(path: &Path) -> impl Fn(std::io::Error) -> Self + '_ {
+        move |source| Self::Write {
+            path: path.to_path_buf(),
+            source,
+        }
+    }
+
     /// The file or folder that it is about.
     pub fn path(&self) -> &Path {
         match self {

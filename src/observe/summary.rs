@@ -150,21 +150,12 @@ pub struct Decision {
     pub why: String,
 }
 
-/// The force with which a condition holds the body.
+/// The force that a condition applies, or with which it holds the body.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Reaction {
+pub struct ConditionForce {
     /// The condition, as the scene names it.
     pub condition: String,
-    /// Force, one component per dimension. Units: N (per thickness in 2D, per section in 1D).
-    pub force: Vec<f64>,
-}
-
-/// The force that a condition applies.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Applied {
-    /// The condition, as the scene names it.
-    pub condition: String,
-    /// Sum of its forces on all sites at the end of the run, one component per dimension. Units: N (per thickness in 2D, per section in 1D).
+    /// Sum of its forces on all sites, one component per dimension. Units: N (per thickness in 2D, per section in 1D).
     pub force: Vec<f64>,
 }
 
@@ -222,10 +213,10 @@ pub struct RunSummary {
     pub out_of_balance_force: Vec<f64>,
     /// Its norm over the sum of the norms of all applied nodal forces and nodal reactions.
     pub out_of_balance_relative: f64,
-    /// Forces of the loads.
-    pub applied: Vec<Applied>,
+    /// Forces of the loads, at the end of the run.
+    pub applied: Vec<ConditionForce>,
     /// Forces of the displacement conditions; of a run in time or in load steps those of the last row of its history.
-    pub reactions: Vec<Reaction>,
+    pub reactions: Vec<ConditionForce>,
     /// Forces in the sections that the scene asks for, at the end of the run.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sections: Vec<SectionForce>,
@@ -342,21 +333,11 @@ impl fmt::Display for RunSummary {
         if let Some(energy) = self.energy {
             writeln!(f, "stored energy          {}", number(energy))?;
         }
-        for a in &self.applied {
-            writeln!(
-                f,
-                "applied                {}: {}",
-                a.condition,
-                components(&a.force)
-            )?;
-        }
-        for r in &self.reactions {
-            writeln!(
-                f,
-                "reaction               {}: {}",
-                r.condition,
-                components(&r.force)
-            )?;
+        let applied = self.applied.iter().map(|a| ("applied", a));
+        let reactions = self.reactions.iter().map(|r| ("reaction", r));
+        for (word, of) in applied.chain(reactions) {
+            let force = components(&of.force);
+            writeln!(f, "{word:<22} {}: {force}", of.condition)?;
         }
         for s in &self.sections {
             write!(
@@ -454,7 +435,7 @@ mod tests {
             residual: f64::NAN,
             out_of_balance_force: vec![1e-3, -2.0],
             out_of_balance_relative: 2.5e-6,
-            reactions: vec![Reaction {
+            reactions: vec![ConditionForce {
                 condition: "left".into(),
                 force: vec![-1.0, 0.0],
             }],

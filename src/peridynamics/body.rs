@@ -20,17 +20,17 @@ use crate::{
     tensor::{Tensor, Tensor4, Vector},
 };
 
-/// Weights of bonds relative to the plain kernel.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
-)]
+/// Weights of bonds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[schemars(rename = "WeightsSpec")]
 pub enum BondWeights {
-    /// The kernel as the papers have it. On a lattice the elastic tensor is then not isotropic.
-    Plain,
-    /// The smallest change of the weights, shell by shell of the lattice, that makes the fourth moments those of the specified material.
+    /// One weight per shell of bonds, so that the lattice carries exactly the typed elastic constants.
+    #[default]
     Isotropic,
-    /// The smallest change of each family's own weights that meets all fourth-moment conditions; for irregular families.
+    /// Volumes as they are, as in the papers; the lattice's stiffness is then not quite the typed one.
+    Plain,
+    /// Fitted family by family to the typed elastic constants; for points that are no lattice.
     Fitted,
 }
 

@@ -83,22 +83,29 @@ fn prediction<const D: usize>(
     ];
     memory.extend(state);
     memory.push(Share::new("output", output));
-    let mut choices = vec![laid_out.rest.coupling(laid_out.traits)];
+    let mut choices = vec![laid_out.rest.coupling(laid_out.setup.traits)];
     // a coupling that was chosen is told already
     let told = choices[0].clone();
-    choices.extend(laid_out.choices.iter().filter(|c| **c != told).cloned());
+    choices.extend(
+        laid_out
+            .setup
+            .choices
+            .iter()
+            .filter(|c| **c != told)
+            .cloned(),
+    );
     Prediction {
-        scene: laid_out.title.clone(),
+        scene: laid_out.setup.title.clone(),
         dimension: D,
-        coupling: laid_out.traits.name.to_owned(),
+        coupling: laid_out.setup.traits.name.to_owned(),
         sizes,
         symmetry: laid_out.moving.system.symmetry(),
         unknowns: sizes.dofs - held,
         peak_memory_bytes: (resident_memory_bytes().unwrap_or(0) + output).max(peak),
         memory,
         base_bytes: peak,
-        total_seconds: laid_out.timings.total(),
-        timings: laid_out.timings.clone(),
+        total_seconds: laid_out.setup.timings.total(),
+        timings: laid_out.setup.timings.clone(),
         choices,
         proof: laid_out.proof.clone(),
         ..Prediction::default()
@@ -143,11 +150,8 @@ fn steps<const D: usize>(
         spec,
         moving: laid_out.moving,
         terms: Arc::clone(&laid_out.terms),
-        remedy: laid_out.remedy,
         proved: laid_out.proved,
-        choices: &mut laid_out.choices,
-        timings: &mut laid_out.timings,
-        watch: &mut laid_out.watch,
+        setup: &mut laid_out.setup,
     }
     .at_start(
         RunOptions::default(),
@@ -165,7 +169,7 @@ fn steps<const D: usize>(
     )?;
     let is_linear = begin.moving.is_linear;
     begin.recorder.begin(&Moment::of(&motion, is_linear));
-    laid_out.watch.lap(&mut laid_out.timings, "start");
+    laid_out.setup.lap("start");
     let seconds_per_step = seconds_per_step(&mut motion, pace.steps, is_linear)?;
     // of a row of the history most is the energies
     let clock = Instant::now();
@@ -178,7 +182,7 @@ fn steps<const D: usize>(
 
     let files = (spec.duration / spec.output_interval).ceil();
     let rows = (spec.duration / spec.history_interval).ceil();
-    let timings = &mut laid_out.timings;
+    let timings = &mut laid_out.setup.timings;
     timings.add("start", per_file);
     timings.add("steps", pace.steps as f64 * seconds_per_step);
     timings.add(
@@ -193,7 +197,7 @@ fn steps<const D: usize>(
             Some(Share::new("state", state_bytes)),
         )
     };
-    prediction.warnings = warnings(model, laid_out.rest, laid_out.traits, &prediction)?;
+    prediction.warnings = warnings(model, laid_out.rest, laid_out.setup.traits, &prediction)?;
     holds(&prediction)?;
     Ok(prediction)
 }
@@ -238,14 +242,18 @@ pub(crate) fn load_steps<const D: usize>(
             laid_out.moving,
             &begin,
             1.0,
-            &mut laid_out.choices,
+            &mut laid_out.setup.choices,
         )?;
         laid_out.moving = moving;
         progress.finish();
         let mut prediction = prediction(&laid_out, held.len(), None);
         factors(&laid_out, spec, &held, &mut prediction, progress)?;
-        prediction.warnings =
-            warnings(laid_out.model, laid_out.rest, laid_out.traits, &prediction)?;
+        prediction.warnings = warnings(
+            laid_out.model,
+            laid_out.rest,
+            laid_out.setup.traits,
+            &prediction,
+        )?;
         prediction.warnings.push(format!(
             "the time of {} is not in the estimate: it depends on the bonds that break",
             match spec.accuracy {

@@ -12,7 +12,6 @@ use super::motion::{self, RunOptions};
 use super::placed_scene::PlacedScene;
 use super::statics;
 use super::zone_placement::{self};
-use crate::material::Kinematics;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::pieces::agreed;
 use crate::observe::provenance;
@@ -22,19 +21,17 @@ use crate::scene::draft::Draft;
 use crate::scene::expression::Expression;
 use crate::scene::rim;
 use crate::scene::source::read;
-use crate::scene::spec::KinematicsSpec;
-use crate::scene::{Scene, SceneError, SceneErrorKind, SceneSpec, Solve, Source};
+use crate::scene::{Scene, SceneError, SceneSpec, Solve, Source};
 use crate::system::Ranks;
 
 /// Validates a scene and places its zone, if it leaves that to the program.
 fn placed<const D: usize>(
     spec: &SceneSpec,
-    kinematics: Kinematics,
     directory: &Path,
     name: &str,
     fingerprint: Fingerprint,
 ) -> Result<Box<PlacedScene<D>>, SceneError> {
-    let draft = Draft::new(spec, kinematics, directory, name, fingerprint)?;
+    let draft = Draft::new(spec, directory, name, fingerprint)?;
     let Some(found) = zone_placement::placed(&draft)? else {
         return Ok(Box::new(rim::scene(&draft, None)?.into()));
     };
@@ -72,6 +69,19 @@ pub enum AnyScene {
     Solid(Box<PlacedScene<3>>),
 }
 
+/// Evaluates an expression of the scene, whatever its dimension.
+macro_rules! each {
+    ($any:expr, $scene:ident => $then:expr) => {
+        match $any {
+            $crate::run::AnyScene::Bar($scene) => $then,
+            $crate::run::AnyScene::Plane($scene) => $then,
+            $crate::run::AnyScene::Solid($scene) => $then,
+        }
+    };
+}
+
+pub(super) use each;
+
 /// Refuses the name of a field that there is not.
 fn known_fields(spec: &SceneSpec) -> Result<(), SceneError> {
     let known = fields::asked_by("output.fields");
@@ -79,15 +89,12 @@ fn known_fields(spec: &SceneSpec) -> Result<(), SceneError> {
     let Some(name) = spec.output.fields.iter().find(unknown) else {
         return Ok(());
     };
-    Err(SceneError::new(
-        SceneErrorKind::WrongValue,
-        format!("`output.fields` names `{name}`, which is no field to ask for"),
-    )
-    .label(name.span.clone(), "not known")
-    .help(format!(
-        "known are {}; `bondline fields` lists all, and the keys of those that have one of their own",
-        known.join(", ")
-    )))
+    Err(SceneError::wrong_value(format!("`output.fields` names `{name}`, which is no field to ask for"))
+        .label(name.span.clone(), "not known")
+        .help(format!(
+            "known are {}; `bondline fields` lists all, and the keys of those that have one of their own",
+            known.join(", ")
+        )))
 }
 
 impl AnyScene {
@@ -106,24 +113,16 @@ impl AnyScene {
     /// A [`SceneError`] with place, value and remedy; for a scene with an `accuracy`, which `bondline_study::from_source` takes.
     pub fn from_source(source: &Source, directory: &Path, name: &str) -> Result<Self, SceneError> {
         if source.table()?.contains_key("accuracy") {
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                "`accuracy` leaves open what only trial runs of the scene can choose",
-            )
-            .help("load it by `bondline_study::load`, which makes them; or type mesh, horizon and points, and leave `accuracy` out")
-            .shown_in(source));
+            return Err(SceneError::conflict("`accuracy` leaves open what only trial runs of the scene can choose")
+                .help("load it by `bondline_study::load`, which makes them; or type mesh, horizon and points, and leave `accuracy` out")
+                .shown_in(source));
         }
         Self::complete(source, directory, name)
     }
 
     /// Keeps the choices made for an accuracy, to be reported with the results.
     pub fn chose(&mut self, choices: Vec<Decision>) {
-        let known = match self {
-            Self::Bar(s) => &mut s.choices,
-            Self::Plane(s) => &mut s.choices,
-            Self::Solid(s) => &mut s.choices,
-        };
-        known.splice(0..0, choices);
+        each!(self, s => drop(s.choices.splice(0..0, choices)));
     }
 
     /// Validates a scene that leaves nothing open, whether or not it has an `accuracy`.
@@ -134,60 +133,34 @@ impl AnyScene {
         let spec = SceneSpec::parse(source)?;
         known_fields(&spec).map_err(|error| error.shown_in(source))?;
         let print = source.fingerprint()?;
-        let found = match spec.kinematics.get_ref() {
-            KinematicsSpec::Bar => {
-                placed(&spec, Kinematics::Bar, directory, name, print).map(Self::Bar)
-            }
-            KinematicsSpec::PlaneStress => {
-                placed(&spec, Kinematics::PlaneStress, directory, name, print).map(Self::Plane)
-            }
-            KinematicsSpec::PlaneStrain => {
-                placed(&spec, Kinematics::PlaneStrain, directory, name, print).map(Self::Plane)
-            }
-            KinematicsSpec::Solid => {
-                placed(&spec, Kinematics::Solid, directory, name, print).map(Self::Solid)
-            }
+        let found = match spec.dimension() {
+            1 => placed(&spec, directory, name, print).map(Self::Bar),
+            2 => placed(&spec, directory, name, print).map(Self::Plane),
+            _ => placed(&spec, directory, name, print).map(Self::Solid),
         };
         found.map_err(|error| error.shown_in(source))
     }
 
     /// The scene, if it is of `D` dimensions.
     pub fn of_dimension<const D: usize>(self) -> Option<Scene<D>> {
-        let found: Box<dyn Any> = match self {
-            Self::Bar(scene) => scene,
-            Self::Plane(scene) => scene,
-            Self::Solid(scene) => scene,
-        };
+        let found: Box<dyn Any> = each!(self, scene => scene);
         let scene = found.downcast::<PlacedScene<D>>().ok()?;
         Some(scene.scene)
     }
 
     /// Writes all files into another folder than the scene's.
     pub fn set_output_directory(&mut self, directory: PathBuf) {
-        match self {
-            Self::Bar(s) => s.output.directory = directory,
-            Self::Plane(s) => s.output.directory = directory,
-            Self::Solid(s) => s.output.directory = directory,
-        }
+        each!(self, s => s.output.directory = directory);
     }
 
     /// Returns true if the scene runs in steps, so that it can be interrupted and resumed.
     pub fn moves(&self) -> bool {
-        let solve = match self {
-            Self::Bar(s) => &s.solve,
-            Self::Plane(s) => &s.solve,
-            Self::Solid(s) => &s.solve,
-        };
-        *solve != Solve::Static
+        each!(self, s => s.solve != Solve::Static)
     }
 
     /// The horizon \[m\], typed or chosen; none without points, and of one that varies in space.
     pub fn horizon(&self) -> Option<f64> {
-        let points = match self {
-            Self::Bar(s) => s.peridynamics.as_ref().map(|p| &p.horizon),
-            Self::Plane(s) => s.peridynamics.as_ref().map(|p| &p.horizon),
-            Self::Solid(s) => s.peridynamics.as_ref().map(|p| &p.horizon),
-        };
+        let points = each!(self, s => s.peridynamics.as_ref().map(|p| &p.horizon));
         points.and_then(Expression::as_constant)
     }
 
@@ -217,11 +190,7 @@ impl AnyScene {
         }
         let unused = self.unused().to_vec();
         let scene_hash = self.scene_hash();
-        let mut summary = match self {
-            Self::Bar(s) => run(*s, options, progress),
-            Self::Plane(s) => run(*s, options, progress),
-            Self::Solid(s) => run(*s, options, progress),
-        }?;
+        let mut summary = each!(self, s => run(*s, options, progress))?;
         summary.warnings.extend(unused);
         (summary.version, summary.scene_hash) = (provenance::VERSION, scene_hash);
         Ok(summary)
@@ -229,39 +198,22 @@ impl AnyScene {
 
     /// Fingerprint of all of the scene that determines its results: 16 hexadecimal digits.
     pub fn scene_hash(&self) -> String {
-        let fingerprint = match self {
-            Self::Bar(s) => &s.fingerprint,
-            Self::Plane(s) => &s.fingerprint,
-            Self::Solid(s) => &s.fingerprint,
-        };
-        provenance::scene_hash(fingerprint.value())
+        provenance::scene_hash(each!(self, s => s.fingerprint.value()))
     }
 
     /// The file of the [`Provenance`](provenance::Provenance) of a run.
     pub fn provenance_path(&self) -> PathBuf {
-        let (folder, name) = match self {
-            Self::Bar(s) => (&s.output.directory, &s.output.name),
-            Self::Plane(s) => (&s.output.directory, &s.output.name),
-            Self::Solid(s) => (&s.output.directory, &s.output.name),
-        };
+        let (folder, name) = each!(self, s => (&s.output.directory, &s.output.name));
         folder.join(format!("{name}{}", provenance::PROVENANCE))
     }
 
     /// Warnings of parts of the scene that touch nothing.
     pub fn unused(&self) -> &[String] {
-        match self {
-            Self::Bar(s) => &s.unused,
-            Self::Plane(s) => &s.unused,
-            Self::Solid(s) => &s.unused,
-        }
+        each!(self, s => &s.unused)
     }
 
     /// Refuses what needs more memory than there is, before anything of it is laid out.
     pub fn fits(&self) -> Result<(), RunError> {
-        match self {
-            Self::Bar(s) => budget::fits(s),
-            Self::Plane(s) => budget::fits(s),
-            Self::Solid(s) => budget::fits(s),
-        }
+        each!(self, s => budget::fits(s))
     }
 }

@@ -7,14 +7,13 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::mesh::Mesh;
-use crate::model::{CellRole, Reach, Zone};
+use crate::model::{CellRole, PointSource, Reach, Zone};
 use crate::observe::report::number;
 use crate::observe::summary::{bytes_text, grouped, resident_memory_bytes};
+use crate::peridynamics::BondWeights;
 use crate::run::error::RunError;
 use crate::scene::Peridynamics;
-use crate::scene::points::Points;
 use crate::scene::solve::Solve;
-use crate::scene::spec::WeightsSpec;
 use crate::scene::validated::Scene;
 use serde::Serialize;
 
@@ -139,16 +138,16 @@ impl Counts {
         let roles = coupling.roles(mesh, &scene.zones, largest);
         let reach = coupling.reach(law);
         counts.is_state_based = !law.is_pairwise();
-        counts.is_lattice = !matches!(p.points, Points::Cells)
-            && p.weights != WeightsSpec::Fitted
+        counts.is_lattice = !matches!(p.points, PointSource::Cells)
+            && p.weights != BondWeights::Fitted
             && p.horizon.as_constant().is_some();
 
         let around_elements = counts.add_families(mesh, p, &roles, &horizon);
         let levels = if reach == Reach::Own { 1.0 } else { 2.0 };
         let spacing = match &p.points {
-            Points::Cells => None,
-            Points::Lattice { spacing, .. } => Some(*spacing),
-            Points::Lattices { lattices, .. } => {
+            PointSource::Cells => None,
+            PointSource::Lattice { spacing, .. } => Some(*spacing),
+            PointSource::Lattices { lattices, .. } => {
                 (lattices.iter().map(|l| l.spacing)).min_by(f64::total_cmp)
             }
         };
@@ -195,9 +194,9 @@ impl Counts {
         for (c, role) in roles.iter().enumerate() {
             let volume = mesh.cell_volume(c).abs();
             let (spacing, delta) = match &p.points {
-                Points::Cells => (volume.powf(1.0 / D as f64), horizon[c]),
-                Points::Lattice { spacing, .. } => (*spacing, horizon[c]),
-                Points::Lattices { lattices, of_cell } => {
+                PointSource::Cells => (volume.powf(1.0 / D as f64), horizon[c]),
+                PointSource::Lattice { spacing, .. } => (*spacing, horizon[c]),
+                PointSource::Lattices { lattices, of_cell } => {
                     let own = &lattices[usize::from(of_cell[c])];
                     (own.spacing, own.horizon)
                 }
@@ -387,8 +386,8 @@ fn remedy<const D: usize>(scene: &Scene<D>, counts: &Counts, there: u64) -> Stri
     let rest: f64 = PER_CELL * counts.cells as f64 + PER_NODE * counts.nodes as f64;
     let left = there as f64 - rest;
     let spacing = match scene.peridynamics.as_ref().map(|p| &p.points) {
-        Some(Points::Lattice { spacing, .. }) if left > 0.0 => *spacing,
-        Some(Points::Lattices { .. }) if left > 0.0 => {
+        Some(PointSource::Lattice { spacing, .. }) if left > 0.0 => *spacing,
+        Some(PointSource::Lattices { .. }) if left > 0.0 => {
             return "use larger spacings or smaller horizons, or make the nonlocal zone smaller"
                 .to_owned();
         }
@@ -450,7 +449,7 @@ impl Counts {
             .sum();
         let cell = volume / self.cells.max(1) as f64;
         let h = match scene.peridynamics.as_ref().map(|p| &p.points) {
-            Some(Points::Lattice { spacing, .. }) => *spacing,
+            Some(PointSource::Lattice { spacing, .. }) => *spacing,
             _ => cell.powf(1.0 / D as f64),
         };
         let fastest = scene

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use crate::model::Model;
-use crate::observe::summary::Reaction;
+use crate::observe::summary::ConditionForce;
 use crate::run::error::RunError;
 use crate::scene::conditions::Condition;
 use crate::system::{ForceTerm, Interval, SpringRows};
@@ -70,7 +70,7 @@ impl ConditionTerms {
     }
 
     /// The force of each condition on the body, at the displacement `u` of all dofs.
-    pub fn reactions<const D: usize>(&self, u: &[f64]) -> Vec<Reaction> {
+    pub fn reactions<const D: usize>(&self, u: &[f64]) -> Vec<ConditionForce> {
         let of_one = |(name, term): &(String, Arc<dyn ForceTerm>)| {
             let mut force = vec![0.0; u.len()];
             term.add_force(u, &mut force, Interval::AT_ONCE);
@@ -78,7 +78,7 @@ impl ConditionTerms {
             for (dof, f) in force.iter().enumerate() {
                 sum[dof % D] -= f;
             }
-            Reaction {
+            ConditionForce {
                 condition: name.clone(),
                 force: sum,
             }

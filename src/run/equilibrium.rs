@@ -8,7 +8,7 @@ use std::time::Instant;
 use super::budget;
 use super::condition_terms::ConditionTerms;
 use super::loads::{loads, supports};
-use crate::observe::summary::{Applied, Decision, Stopwatch, Timings};
+use crate::observe::summary::{ConditionForce, Decision, Stopwatch, Timings};
 use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::run::thermal::Thermal;
@@ -61,7 +61,7 @@ pub(crate) struct Equilibrium {
     pub symmetry: Symmetry,
     pub load: Vec<f64>,
     /// The force of each load.
-    pub applied: Vec<Applied>,
+    pub applied: Vec<ConditionForce>,
     /// The condition that holds each dof.
     pub holder: Vec<Option<usize>>,
     pub solution: StaticSolution,

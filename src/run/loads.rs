@@ -8,7 +8,7 @@ use crate::fem;
 use crate::mesh::Facet;
 use crate::mesh::boundary::BoundaryFacet;
 use crate::model::{CellRole, Model, SiteKind};
-use crate::observe::summary::Applied;
+use crate::observe::summary::ConditionForce;
 use crate::run::error::RunError;
 use crate::scene::conditions::{Components, Condition, Prescribed, Support};
 use crate::scene::load::Domain;
@@ -414,14 +414,14 @@ pub fn loads<const D: usize>(
     model: &Model<D>,
     conditions: &[Condition<D>],
     t: f64,
-) -> Result<(Vec<f64>, Vec<Applied>), RunError> {
+) -> Result<(Vec<f64>, Vec<ConditionForce>), RunError> {
     let loads = Loads::new(model, conditions, BodyForces::Consistent)?;
     let mut load = vec![0.0; model.sites.len() * D];
     let mut applied = Vec::new();
     for number in loads.conditions() {
         let condition = &conditions[number];
         let force = loads.add_condition(condition, number, t, &mut load);
-        applied.push(Applied {
+        applied.push(ConditionForce {
             condition: condition.name.clone(),
             force: force.iter().copied().collect(),
         });

@@ -2,7 +2,7 @@
 
 use crate::model::Sampler;
 use crate::progress::Progress;
-use crate::run::any_scene::AnyScene;
+use crate::run::any_scene::{AnyScene, each};
 use crate::run::error::RunError;
 use crate::run::placed_scene::PlacedScene;
 use crate::run::solution::Solved;
@@ -35,11 +35,7 @@ impl AnyScene {
         places: &mut Vec<[f64; 3]>,
         progress: &dyn Progress,
     ) -> Result<Samples, RunError> {
-        match self {
-            Self::Bar(scene) => samples(*scene, places, progress),
-            Self::Plane(scene) => samples(*scene, places, progress),
-            Self::Solid(scene) => samples(*scene, places, progress),
-        }
+        each!(self, scene => samples(*scene, places, progress))
     }
 }
 

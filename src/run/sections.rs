@@ -22,9 +22,7 @@ use crate::run::setup::RunSettings;
 use crate::scene::conditions::{Condition, Support};
 use crate::scene::load::Domain;
 use crate::scene::section::Section;
-use crate::tensor::{Vector, padded};
-
-const AXES: [&str; 3] = ["x", "y", "z"];
+use crate::tensor::{AXES, Vector, padded};
 
 /// Axes along which there is a moment: none in 1D, z in 2D.
 const fn moment_axes<const D: usize>() -> &'static [usize] {

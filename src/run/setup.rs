@@ -5,8 +5,8 @@ use std::sync::Arc;
 use crate::material::LocalLaw;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::{Decision, Sizes};
+use crate::peridynamics::PartialVolume;
 use crate::peridynamics::bond_force::BondKinematics;
-use crate::peridynamics::{BondWeights, PartialVolume};
 use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::run::stress_settings::StressSettings;
@@ -17,14 +17,13 @@ use crate::scene::failure::Breaking;
 use crate::scene::impactors::Impactor;
 use crate::scene::initial::Initial;
 use crate::scene::materials::{Material, Ratio};
-use crate::scene::points::Points;
-use crate::scene::spec::{BondsSpec, CouplingTraits, ElementsSpec, SurfacesSpec, WeightsSpec};
+use crate::scene::spec::{CouplingTraits, ElementsSpec};
 use crate::scene::validated::{Output, Scene, Solver};
 use crate::system::Ranks;
 use crate::tensor::padded;
 use crate::{
     coupling::{Coupling, Operator, Problem},
-    model::{self, ElasticCells, HorizonField, Model, PointSource, Surfaces, ZonedBody},
+    model::{self, ElasticCells, HorizonField, Model, ZonedBody},
 };
 
 /// A typed horizon.
@@ -130,9 +129,11 @@ impl<const D: usize> RunSettings<D> {
             .as_ref()
             .filter(|_| model.body().is_some());
         let bonds = body.and_then(|p| match (self.breaking.bonds, p.law.is_linear()) {
-            (BondsSpec::Linear, true) => None,
-            (BondsSpec::Exact, _) => Some(("geometrically exact bonds", "bonds = \"exact\"")),
-            (BondsSpec::Linear, false) => Some(("bonds that are not linear", "as their law says")),
+            (BondKinematics::Linear, true) => None,
+            (BondKinematics::Exact, _) => Some(("geometrically exact bonds", "bonds = \"exact\"")),
+            (BondKinematics::Linear, false) => {
+                Some(("bonds that are not linear", "as their law says"))
+            }
         });
         let elements = || {
             self.has_nonlinear_elements(model).then_some((
@@ -152,10 +153,7 @@ impl<const D: usize> RunSettings<D> {
 
     /// Kinematics of the bonds.
     pub fn kinematics(&self) -> BondKinematics {
-        match self.breaking.bonds {
-            BondsSpec::Exact => BondKinematics::Exact,
-            BondsSpec::Linear => BondKinematics::Linear,
-        }
+        self.breaking.bonds
     }
 
     /// The coupling as a choice: why it was made, or what it does if the scene names it.
@@ -186,30 +184,17 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
         why,
     });
     let tensors = scene.materials.iter().map(|m| m.stiffness()).collect();
-    let local = |m: &Material<D>| m.law.local_law().filter(|law| !law.is_linear());
-    let local_laws = scene.materials.iter().map(local).collect();
     let density = scene.materials.iter().map(|m| m.density).collect();
     let (voids, barriers) = (scene.voids, scene.barriers);
     let peridynamics = scene.peridynamics.map(|p| model::Peridynamics {
         law,
         horizon: horizon_field(p.horizon),
-        points: match p.points {
-            Points::Cells => PointSource::Cells,
-            Points::Lattice { spacing, origin } => PointSource::Lattice { spacing, origin },
-            Points::Lattices { lattices, of_cell } => PointSource::Lattices { lattices, of_cell },
-        },
-        weights: match p.weights {
-            WeightsSpec::Isotropic => BondWeights::Isotropic,
-            WeightsSpec::Plain => BondWeights::Plain,
-            WeightsSpec::Fitted => BondWeights::Fitted,
-        },
+        points: p.points,
+        weights: p.weights,
         volumes: p.volumes,
         barriers,
         voids,
-        surfaces: match p.surfaces {
-            SurfacesSpec::Cut => Surfaces::Cut,
-            SurfacesSpec::Uncut => Surfaces::Uncut,
-        },
+        surfaces: p.surfaces,
     });
     (
         Problem {
@@ -236,7 +221,7 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
             follow: scene.follow,
             fingerprint: scene.fingerprint,
             elements: scene.elements,
-            local_laws,
+            local_laws: stresses.local_laws.clone(),
             materials: scene.materials,
             density,
             stresses,

@@ -8,13 +8,11 @@ use crate::fem::{self, Locator};
 use crate::scene::validated::FieldChoice;
 use crate::shape::Shape;
 use crate::system::Ranks;
-use crate::tensor::{Tensor, Vector};
+use crate::tensor::{AXES, Tensor, Vector};
 use crate::{
     model::{Carrier, Sampler},
     parallel,
 };
-
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The columns of a table along positions: place, displacement, strain, the stress where numbers made of it are asked for, further fields that are asked for, and the model.
 pub(super) fn table_header<const D: usize>(choice: &FieldChoice) -> Vec<String> {

@@ -18,7 +18,7 @@ use crate::dimension;
 use crate::observe::ObserveError;
 use crate::observe::proof::Proof;
 use crate::observe::summary::{
-    Decision, Reaction, Rotation, RunSummary, SectionForce, Sizes, Stopwatch, Timings,
+    ConditionForce, Decision, Rotation, RunSummary, SectionForce, Sizes, Stopwatch, Timings,
     peak_memory_bytes,
 };
 use crate::progress::Progress;
@@ -427,7 +427,7 @@ impl<const D: usize> StaticBody<'_, D> {
     }
 
     /// The force of each condition that holds dofs.
-    fn reactions(&self, equilibrium: &Equilibrium) -> Vec<Reaction> {
+    fn reactions(&self, equilibrium: &Equilibrium) -> Vec<ConditionForce> {
         let conditions = &self.rest.conditions;
         let mut reactions = vec![Vector::<D>::zeros(); conditions.len()];
         for (dof, holder) in equilibrium.holder.iter().enumerate() {
@@ -439,7 +439,7 @@ impl<const D: usize> StaticBody<'_, D> {
             .iter()
             .zip(&reactions)
             .filter(|(c, _)| c.holds())
-            .map(|(c, r)| Reaction {
+            .map(|(c, r)| ConditionForce {
                 condition: c.name.clone(),
                 force: r.iter().copied().collect(),
             })

@@ -6,7 +6,6 @@ use super::thermal::Thermal;
 use crate::material::{Kinematics, LocalLaw};
 use crate::peridynamics::bond_force::BondKinematics;
 use crate::scene::materials::{Material, Ratio};
-use crate::scene::spec::BondsSpec;
 use crate::scene::validated::{FieldChoice, Scene};
 
 /// Thermal part of a scene's stresses, and the quantities that are made of stresses.
@@ -52,10 +51,7 @@ impl<const D: usize> StressSettings<D> {
             output: scene.output.fields.clone(),
             thermal,
             kinematics,
-            bonds: match scene.breaking.bonds {
-                BondsSpec::Exact => BondKinematics::Exact,
-                BondsSpec::Linear => BondKinematics::Linear,
-            },
+            bonds: scene.breaking.bonds,
             local_laws: (scene.materials.iter())
                 .map(|m| m.law.local_law().filter(|law| !law.is_linear()))
                 .collect(),

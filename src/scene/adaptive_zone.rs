@@ -1,17 +1,18 @@
 //! A nonlocal zone that follows the crack: its settings, and the scenes that cannot have it.
 
 use super::bounds_checks;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::failure::Breaking;
 use super::peridynamics::Peridynamics;
 use super::solve::Solve;
 use super::source::Span;
-use super::spec::{CouplingSpec, CutBondsSpec, SceneSpec, SkinSpec, ZonesNeeded};
+use super::spec::{CouplingSpec, SceneSpec, SkinSpec, ZonesNeeded};
+use crate::coupling::truncated::CutBonds;
 use crate::mesh::Mesh;
+use crate::model::PointSource;
 use crate::observe::report::number;
 use crate::peridynamics::Law;
 use crate::peridynamics::failure::Fracture;
-use crate::scene::points::Points;
 use crate::scene::selected_coupling::SelectedCoupling;
 
 /// Horizons between damage and the edge of the zone: one in which bonds do not break, and one to the points whose bonds reach there.
@@ -53,7 +54,7 @@ fn supported<'a, const D: usize>(
     bonds: Option<(&'a Peridynamics<D>, &'a dyn Law<D>)>,
 ) -> Result<(&'a Peridynamics<D>, &'a dyn Law<D>), SceneError> {
     let refused = |message: String, label: &str, help: &str| {
-        SceneError::new(SceneErrorKind::Conflict, message)
+        SceneError::conflict(message)
             .label(span.clone(), label)
             .help(help)
     };
@@ -98,7 +99,7 @@ fn supported<'a, const D: usize>(
     };
     if let CouplingSpec::Truncated(truncated) = &mut selected.coupling {
         // the zone changes before damage comes near, and nothing that broke at the seam would be carried over
-        if truncated.cut_bonds == Some(CutBondsSpec::Breaking) {
+        if truncated.cut_bonds == Some(CutBonds::Breaking) {
             return Err(refused(
                 "`zones.follow` is set, and `coupling.truncated.cut-bonds` is \"breaking\""
                     .to_owned(),
@@ -106,9 +107,9 @@ fn supported<'a, const D: usize>(
                 "write cut-bonds = \"linear\", or leave it out",
             ));
         }
-        truncated.cut_bonds = Some(CutBondsSpec::Linear);
+        truncated.cut_bonds = Some(CutBonds::Linear);
     }
-    if matches!(p.points, Points::Lattices { .. }) {
+    if matches!(p.points, PointSource::Lattices { .. }) {
         return Err(refused(
             "`zones.follow` and `zones.bodies` are set".to_owned(),
             "follows on one lattice",

@@ -1,17 +1,17 @@
 //! Agreement of parts of a scene that are right alone: materials with zones, horizons with spacings.
 
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
 use super::solve::Solve;
-use super::spec::{CouplingSpec, CutBondsSpec, ElementsSpec, SceneSpec, SolveSpec, ZonesNeeded};
+use super::spec::{CouplingSpec, ElementsSpec, SceneSpec, SolveSpec, ZonesNeeded};
+use crate::coupling::truncated::CutBonds;
 use crate::fem::{CellBandError, banded_law, crack_band};
 use crate::mesh::Mesh;
-use crate::model::Zone;
+use crate::model::{PointSource, Zone};
 use crate::observe::report::number;
 use crate::peridynamics::ZeroEnergyControl;
 use crate::peridynamics::failure::Fracture;
-use crate::scene::points::Points;
 
 /// Refuses a law that is not linear where rows at the seam would not balance it: those of splice, blending, balanced and partial stress hold a uniform strain whatever stress the two sides have.
 pub(crate) fn balanced_seam<const D: usize>(
@@ -55,17 +55,13 @@ pub(crate) fn balanced_seam<const D: usize>(
             "use coupling = \"nonlocal\"; or, of a law without memory, coupling = \"splice\" with peridynamics.elements = \"cauchy-born\""
         }
     };
-    let name = spec.materials.get_key_value(material.name.as_str());
-    Err(SceneError::new(
-        SceneErrorKind::Conflict,
-        format!(
-            "the law of the material `{}`, {}, is not linear, finite elements are linear, and coupling `{}` does not balance the stresses of the two",
-            material.name,
-            material.law.name(),
-            traits.name
-        ),
-    )
-    .label(name.map_or(0..0, |(k, _)| k.span.clone()), "of this material")
+    Err(SceneError::conflict(format!(
+        "the law of the material `{}`, {}, is not linear, finite elements are linear, and coupling `{}` does not balance the stresses of the two",
+        material.name,
+        material.law.name(),
+        traits.name
+    ))
+    .label(spec.span_of_material(&material.name), "of this material")
     .help(remedy))
 }
 
@@ -78,30 +74,24 @@ pub(crate) fn cut_bonds<const D: usize>(
     let (CouplingSpec::Truncated(typed), Some(named)) = (coupling, &spec.coupling) else {
         return Ok(());
     };
-    if typed.cut_bonds == Some(CutBondsSpec::Breaking)
+    if typed.cut_bonds == Some(CutBonds::Breaking)
         && !material.fracture.is_none_or(Fracture::is_of_stretch)
     {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!(
-                "`coupling.truncated.cut-bonds` is \"breaking\", and bonds of the material `{}` break by the state of their points, which those that the seam cuts do not know",
-                material.name
-            ),
-        )
+        return Err(SceneError::conflict(format!(
+            "`coupling.truncated.cut-bonds` is \"breaking\", and bonds of the material `{}` break by the state of their points, which those that the seam cuts do not know",
+            material.name
+        ))
         .label(named.span(), "cuts bonds")
         .help("let cut-bonds = \"linear\", or leave it out, and keep damage two horizons away from the seam"));
     }
     if typed.cut_bonds.is_none() || material.law.linearised().is_ordinary() {
         return Ok(());
     }
-    Err(SceneError::new(
-        SceneErrorKind::Conflict,
-        format!(
-            "`coupling.truncated.cut-bonds` is set, and the law of the material `{}`, {}, has no bonds that a seam could cut",
-            material.name,
-            material.law.name()
-        ),
-    )
+    Err(SceneError::conflict(format!(
+        "`coupling.truncated.cut-bonds` is set, and the law of the material `{}`, {}, has no bonds that a seam could cut",
+        material.name,
+        material.law.name()
+    ))
     .label(named.span(), "families end on the faces of elements")
     .help("remove cut-bonds"))
 }
@@ -123,19 +113,12 @@ pub(crate) fn elastic_elements<const D: usize>(
     let Some(material) = of_local.find(|m| bends(m)) else {
         return Ok(());
     };
-    let name = spec.materials.get_key_value(material.name.as_str());
-    Err(SceneError::new(
-        SceneErrorKind::Conflict,
-        format!(
-            "finite elements of the material `{}` would stay elastic, and its law, {}, is not",
-            material.name,
-            material.law.name()
-        ),
-    )
-    .label(
-        name.map_or(0..0, |(k, _)| k.span.clone()),
-        "of this material",
-    )
+    Err(SceneError::conflict(format!(
+        "finite elements of the material `{}` would stay elastic, and its law, {}, is not",
+        material.name,
+        material.law.name()
+    ))
+    .label(spec.span_of_material(&material.name), "of this material")
     .help("use coupling = \"nonlocal\", or give these cells an elastic material of their own"))
 }
 
@@ -179,17 +162,13 @@ pub(crate) fn crack_bands<const D: usize>(
                 "use cells of first order where this material is".to_owned(),
             ),
         };
-        let name = spec.materials.get_key_value(material.name.as_str());
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!(
-                "the material `{}` at {:?}: {why}",
-                material.name,
-                mesh.centroid(cell).as_slice()
-            ),
-        )
+        return Err(SceneError::conflict(format!(
+            "the material `{}` at {:?}: {why}",
+            material.name,
+            mesh.centroid(cell).as_slice()
+        ))
         .label(
-            name.map_or(0..0, |(k, _)| k.span.clone()),
+            spec.span_of_material(&material.name),
             "a crack is one row of cells wide",
         )
         .help(help));
@@ -243,7 +222,7 @@ pub(crate) fn memory<const D: usize>(
         material.name,
         material.law.name()
     );
-    let refused = |message: String| SceneError::new(SceneErrorKind::Conflict, message);
+    let refused = |message: String| SceneError::conflict(message);
     Err(match (is_static, follows) {
         (false, Some(follow)) => refused(format!("`zones.follow` is set, and {of}"))
             .label(
@@ -251,15 +230,12 @@ pub(crate) fn memory<const D: usize>(
                 "lays points and elements out anew, and their history would be lost",
             )
             .help("draw a zone that is wide enough, or remove it"),
-        _ => {
-            let name = spec.materials.get_key_value(material.name.as_str());
-            refused(format!("{of}, and a static scene has no time"))
-                .label(
-                    name.map_or(0..0, |(k, _)| k.span.clone()),
-                    "its forces depend on how the load came",
-                )
-                .help("add [solve.quasi-static] with steps = ..., or [solve.explicit]")
-        }
+        _ => refused(format!("{of}, and a static scene has no time"))
+            .label(
+                spec.span_of_material(&material.name),
+                "its forces depend on how the load came",
+            )
+            .help("add [solve.quasi-static] with steps = ..., or [solve.explicit]"),
     })
 }
 
@@ -283,22 +259,18 @@ pub(crate) fn drag<const D: usize>(
     let Some(material) = used.find(drags) else {
         return Ok(());
     };
-    let name = spec.materials.get_key_value(material.name.as_str());
-    Err(SceneError::new(
-        SceneErrorKind::Conflict,
-        format!(
-            "`zero-energy-control` of the material `{}` is \"drag\", which resists velocities of one time step, {why}",
-            material.name
-        ),
-    )
-    .label(name.map_or(0..0, |(k, _)| k.span.clone()), "of this material")
+    Err(SceneError::conflict(format!(
+        "`zero-energy-control` of the material `{}` is \"drag\", which resists velocities of one time step, {why}",
+        material.name
+    ))
+    .label(spec.span_of_material(&material.name), "of this material")
     .help("use zero-energy-control = \"bond-force\" or \"length\", or [solve.explicit] without `sub-steps`"))
 }
 
 /// Refuses a horizon that was `taken` since none is typed where bonds of the points' materials may break.
 ///
 /// # Errors
-/// [`SceneErrorKind::Missing`], with the horizon that would have been taken.
+/// [`SceneErrorKind::Missing`](crate::scene::SceneErrorKind::Missing), with the horizon that would have been taken.
 pub(crate) fn horizon_where_bonds_break<'a, const D: usize>(
     spec: &SceneSpec,
     taken: Option<f64>,
@@ -311,18 +283,11 @@ pub(crate) fn horizon_where_bonds_break<'a, const D: usize>(
     if *solve == Solve::Static {
         return Ok(());
     }
-    let name = spec.materials.get_key_value(material.name.as_str());
-    Err(SceneError::new(
-        SceneErrorKind::Missing,
-        format!(
-            "`peridynamics` lacks `horizon`, and bonds of the material `{}` may break",
-            material.name
-        ),
-    )
-    .label(
-        name.map_or(0..0, |(key, _)| key.span.clone()),
-        "its strength and its cracks depend on the horizon, which is a length of the material",
-    )
+    Err(SceneError::missing(format!(
+        "`peridynamics` lacks `horizon`, and bonds of the material `{}` may break",
+        material.name
+    ))
+    .label(spec.span_of_material(&material.name), "its strength and its cracks depend on the horizon, which is a length of the material")
     .help(format!(
         "add horizon = {} to [peridynamics], three spacings of the points, or the length that its cracks have",
         number(taken)
@@ -340,28 +305,25 @@ pub(crate) fn horizon<const D: usize>(
         let x = mesh.centroid(c);
         let delta = p.horizon_at(&x);
         let spacing = match &p.points {
-            Points::Lattice { spacing, .. } => *spacing,
+            PointSource::Lattice { spacing, .. } => *spacing,
             // checked body by body
-            Points::Lattices { .. } => continue,
-            Points::Cells if zones[c] == Zone::Nonlocal => {
+            PointSource::Lattices { .. } => continue,
+            PointSource::Cells if zones[c] == Zone::Nonlocal => {
                 mesh.cell_volume(c).abs().powf(1.0 / D as f64)
             }
-            Points::Cells => 0.0,
+            PointSource::Cells => 0.0,
         };
         if delta.is_finite() && delta > 0.0 && delta >= spacing * (1.0 - 1e-9) {
             continue;
         }
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            if delta.is_finite() && delta > 0.0 {
-                format!(
-                    "`peridynamics.horizon` is {delta} at {:?}, below the spacing {spacing} of the points there",
-                    x.as_slice()
-                )
-            } else {
-                format!("`peridynamics.horizon` is {delta} at {:?}", x.as_slice())
-            },
-        )
+        return Err(SceneError::wrong_value(if delta.is_finite() && delta > 0.0 {
+            format!(
+                "`peridynamics.horizon` is {delta} at {:?}, below the spacing {spacing} of the points there",
+                x.as_slice()
+            )
+        } else {
+            format!("`peridynamics.horizon` is {delta} at {:?}", x.as_slice())
+        })
         .label(
             (spec.peridynamics.as_ref())
                 .and_then(|p| p.horizon.as_ref())
@@ -371,7 +333,7 @@ pub(crate) fn horizon<const D: usize>(
         .help(if delta.is_finite() && delta > 0.0 {
             let third = number(delta / 3.0);
             let points = match &p.points {
-                Points::Cells => format!("refine the mesh there, or use points.lattice = {{ spacing = {third} }}, a third of the horizon"),
+                PointSource::Cells => format!("refine the mesh there, or use points.lattice = {{ spacing = {third} }}, a third of the horizon"),
                 _ => format!("use a spacing of {third}, a third of the horizon, or less"),
             };
             format!("{points}; or a horizon of {} to {}, three to six spacings", number(3.0 * spacing), number(6.0 * spacing))

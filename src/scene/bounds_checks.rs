@@ -1,6 +1,6 @@
 //! Checks of single numbers and expressions.
 
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::expression::Expression;
 use super::value::Number;
 
@@ -37,12 +37,11 @@ pub(crate) fn within(
     if right {
         return Ok(number.value);
     }
-    Err(SceneError::new(
-        SceneErrorKind::WrongValue,
-        format!("`{place}` is {}", number.value),
+    Err(
+        SceneError::wrong_value(format!("`{place}` is {}", number.value))
+            .label(number.span.clone(), must)
+            .help(help),
     )
-    .label(number.span.clone(), must)
-    .help(help))
 }
 
 /// Refuses an expression in `y` or `z` where the scene has no such axis.
@@ -54,13 +53,10 @@ pub(crate) fn no_further_axes<const D: usize>(
     let is_function = expression.function().is_some();
     match (D..3).find(|&k| !is_function && expression.depends_on(k)) {
         None => Ok(()),
-        Some(k) => Err(SceneError::new(
-            SceneErrorKind::Dimension,
-            format!(
-                "`{place}` uses {} in a scene of dimension {D}",
-                ["x", "y", "z"][k]
-            ),
-        )
+        Some(k) => Err(SceneError::dimension(format!(
+            "`{place}` uses {} in a scene of dimension {D}",
+            ["x", "y", "z"][k]
+        ))
         .label(expression.span.clone(), "no such axis")
         .help(format!(
             "use {} only",

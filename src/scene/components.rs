@@ -3,11 +3,12 @@
 use std::cell::{Cell, RefCell};
 
 use super::bounds_checks;
-use super::error::{SceneError, SceneErrorKind};
+use super::condition_at::ConditionAt;
+use super::error::SceneError;
 use super::expression::Expression;
-use super::solve::Clock;
+use super::source::Span;
 use super::value::Text;
-use crate::tensor::{Vector, padded};
+use crate::tensor::{AXES, Vector, padded};
 
 /// A vector field, component by component; components left out are free or zero.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,103 +89,103 @@ impl<const D: usize> Components<D> {
     }
 }
 
+/// The error of a component along an axis that the scene does not have.
+pub(super) fn no_such_axis<const D: usize>(place: &str, axis: usize, span: &Span) -> SceneError {
+    let axis = AXES[axis];
+    SceneError::dimension(format!("`{place}.{axis}` in a scene of dimension {D}"))
+        .label(span.clone(), "no such axis")
+        .help(format!("remove `{axis}`"))
+}
+
 /// The components that a scene types, of which there is one at least.
 pub(crate) fn components<const D: usize>(
     place: &str,
     name: &Text,
     given: [&Option<Expression>; 3],
 ) -> Result<Components<D>, SceneError> {
-    let axes = ["x", "y", "z"];
     if let Some((k, e)) = (D..3).find_map(|k| given[k].as_ref().map(|e| (k, e))) {
-        return Err(SceneError::new(
-            SceneErrorKind::Dimension,
-            format!("`{place}.{}` in a scene of dimension {D}", axes[k]),
-        )
-        .label(e.span.clone(), "no such axis")
-        .help(format!("remove `{}`", axes[k])));
+        return Err(no_such_axis::<D>(place, k, &e.span));
     }
-    for (axis, expression) in axes.iter().zip(given) {
+    for (axis, expression) in AXES.iter().zip(given) {
         if let Some(e) = expression {
             bounds_checks::no_further_axes::<D>(&format!("{place}.{axis}"), e)?;
         }
     }
     if given.iter().all(|e| e.is_none()) {
-        return Err(SceneError::new(
-            SceneErrorKind::Missing,
-            format!("`{place}` prescribes no component"),
-        )
-        .label(name.span.clone(), "nothing prescribed")
-        .help(format!(
-            "add {}",
-            ["x = 0", "x = 0 or y = 0", "x = 0, y = 0 or z = 0"][D - 1]
-        )));
+        return Err(
+            SceneError::missing(format!("`{place}` prescribes no component"))
+                .label(name.span.clone(), "nothing prescribed")
+                .help(format!(
+                    "add {}",
+                    ["x = 0", "x = 0 or y = 0", "x = 0, y = 0 or z = 0"][D - 1]
+                )),
+        );
     }
     Ok(Components(std::array::from_fn(|k| given[k].clone())))
 }
 
-/// The same, each admitted by the clock of the scene.
-pub(crate) fn components_in<const D: usize>(
-    place: &str,
-    name: &Text,
-    given: [&Option<Expression>; 3],
-    clock: Clock,
-) -> Result<Components<D>, SceneError> {
-    let components = components::<D>(place, name, given)?;
-    for (axis, e) in ["x", "y", "z"].iter().zip(&components.0) {
-        if let Some(e) = e {
-            clock.admits(&format!("{place}.{axis}"), e)?;
+impl<const D: usize> ConditionAt<'_, D> {
+    /// The components that a condition types, as [`components`], each admitted by the clock of the scene.
+    pub fn components(&self, given: [&Option<Expression>; 3]) -> Result<Components<D>, SceneError> {
+        let components = components::<D>(self.place, self.name, given)?;
+        for (axis, e) in AXES.iter().zip(&components.0) {
+            if let Some(e) = e {
+                self.clock.admits(&format!("{}.{axis}", self.place), e)?;
+            }
         }
+        Ok(components)
     }
-    Ok(components)
-}
 
-/// Checks that all components are numbers at some places.
-pub(crate) fn finite<const D: usize>(
-    place: &str,
-    name: &Text,
-    components: &Components<D>,
-    clock: Clock,
-    positions: impl Iterator<Item = Vector<D>>,
-) -> Result<(), SceneError> {
-    let moving = components.depends_on_time();
-    let instants = clock.instants(moving);
-    let all: Vec<Vector<D>> = positions.collect();
-    for positions in all.chunks(TOGETHER) {
-        let of_instant = |&t: &f64| -> [Option<Vec<f64>>; D] {
-            std::array::from_fn(|k| components.values(k, positions, t))
-        };
-        let values: Vec<_> = instants.iter().map(of_instant).collect();
-        for (i, x) in positions.iter().enumerate() {
-            for (t, values) in instants.iter().zip(&values) {
-                for k in 0..D {
-                    let value = values[k].as_ref().map_or(0.0, |v| v[i]);
-                    if value.is_finite() {
-                        continue;
+    /// Checks that all components are numbers at some places.
+    pub fn finite(
+        &self,
+        components: &Components<D>,
+        positions: impl Iterator<Item = Vector<D>>,
+    ) -> Result<(), SceneError> {
+        let moving = components.depends_on_time();
+        let instants = self.clock.instants(moving);
+        let all: Vec<Vector<D>> = positions.collect();
+        for positions in all.chunks(TOGETHER) {
+            let of_instant = |&t: &f64| -> [Option<Vec<f64>>; D] {
+                std::array::from_fn(|k| components.values(k, positions, t))
+            };
+            let values: Vec<_> = instants.iter().map(of_instant).collect();
+            for (i, x) in positions.iter().enumerate() {
+                for (t, values) in instants.iter().zip(&values) {
+                    for k in 0..D {
+                        let value = values[k].as_ref().map_or(0.0, |v| v[i]);
+                        if !value.is_finite() {
+                            let when = match moving {
+                                true => format!(", t = {t}"),
+                                false => String::new(),
+                            };
+                            let at = format!("{:?}{when}", x.as_slice());
+                            return Err(self.not_finite(components, k, value, &at));
+                        }
                     }
-                    let span = components.0[k]
-                        .as_ref()
-                        .map_or(name.span.clone(), |e| e.span.clone());
-                    let when = match moving {
-                        true => format!(", t = {t}"),
-                        false => String::new(),
-                    };
-                    return Err(SceneError::new(
-                        SceneErrorKind::WrongValue,
-                        format!(
-                            "`{place}.{}` is {value} at {:?}{when}",
-                            ["x", "y", "z"][k],
-                            x.as_slice()
-                        ),
-                    )
-                    .label(span, "no finite number there")
-                    .help(
-                        "choose between branches with if(condition, a, b), or restrict the condition",
-                    ));
                 }
             }
         }
+        Ok(())
     }
-    Ok(())
+
+    /// The error of a component that is no number `at` a place.
+    fn not_finite(
+        &self,
+        components: &Components<D>,
+        axis: usize,
+        value: f64,
+        at: &str,
+    ) -> SceneError {
+        let typed = components.0[axis].as_ref();
+        let span = typed.map_or(self.name.span.clone(), |e| e.span.clone());
+        SceneError::wrong_value(format!(
+            "`{}.{}` is {value} at {at}",
+            self.place, AXES[axis]
+        ))
+        .label(span, "no finite number there")
+        .help("choose between branches with if(condition, a, b), or restrict the condition")
+    }
 }
 
 /// Positions whose values are looked at together.

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use super::condition_kinds::ConditionSpec;
 use super::conditions::{Condition, ConditionTerm, Prescribed, Support};
-use super::error::{SceneError, SceneErrorKind, Span};
+use super::error::{SceneError, Span};
 use super::solve::{Clock, Pacing};
 use super::value::Text;
 use crate::mesh::Mesh;
@@ -23,12 +23,11 @@ pub(crate) fn conditions<const D: usize>(
         let built = condition.build(name, mesh, clock)?;
         let rests = |term: &dyn ConditionTerm<D>| term.holds_at_rest();
         if clock.pacing == Pacing::Still && !built.term().is_none_or(rests) {
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                format!("`conditions.{name}` in a static scene"),
-            )
-            .label(name.span.clone(), "is not linear in the displacement")
-            .help("add [solve.quasi-static] with steps = 1, or [solve.explicit]"));
+            return Err(
+                SceneError::conflict(format!("`conditions.{name}` in a static scene"))
+                    .label(name.span.clone(), "is not linear in the displacement")
+                    .help("add [solve.quasi-static] with steps = 1, or [solve.explicit]"),
+            );
         }
         found.push(built);
     }
@@ -38,8 +37,7 @@ pub(crate) fn conditions<const D: usize>(
         Prescribed::Velocity(_) | Prescribed::Field(_) | Prescribed::Load(_) => false,
     };
     if clock.pacing != Pacing::Moving && !found.iter().any(holds) {
-        return Err(SceneError::new(
-            SceneErrorKind::Missing,
+        return Err(SceneError::missing(
             "no condition prescribes a displacement: nothing holds the body",
         )
         .label(0..0, "no [conditions.NAME.displacement] in this scene")
@@ -80,14 +78,11 @@ fn agree<const D: usize>(
                 } else {
                     String::new()
                 };
-                return Err(SceneError::new(
-                    SceneErrorKind::Conflict,
-                    format!(
-                        "`{first}` and `{second}` prescribe the {} displacements {before} and {value} at {:?}{when}",
-                        ["x", "y", "z"][k],
-                        x.as_slice()
-                    ),
-                )
+                return Err(SceneError::conflict(format!(
+                    "`{first}` and `{second}` prescribe the {} displacements {before} and {value} at {:?}{when}",
+                    ["x", "y", "z"][k],
+                    x.as_slice()
+                ))
                 .label(span(second), "one")
                 .label(span(first), "the other")
                 .help("let both agree where their sets meet, or leave the component out of one"));

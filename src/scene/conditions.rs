@@ -5,6 +5,7 @@
 use std::sync::Arc;
 
 pub use super::components::Components;
+use super::condition_at::ConditionAt;
 use super::load::{Domain, Load};
 pub use super::places::Support;
 use crate::model::Model;
@@ -164,6 +165,17 @@ impl<const D: usize> Condition<D> {
             name: name.to_owned(),
             prescribed: Prescribed::Field(field),
             components: Components(std::array::from_fn(|_| None)),
+        }
+    }
+}
+
+impl<const D: usize> ConditionAt<'_, D> {
+    /// The condition of that name.
+    pub fn prescribes(&self, prescribed: Prescribed<D>, components: Components<D>) -> Condition<D> {
+        Condition {
+            name: self.name.value.clone(),
+            prescribed,
+            components,
         }
     }
 }

@@ -4,7 +4,7 @@
 //! cannot hold (points that are no lattice, say) it is `splice`. Where only the seam itself can tell, because faces cut the lattice anywhere, an LPS has a low
 //! Poisson's ratio, or points have a stress, `truncated` is tried, and the run goes on with `splice` if the seam, or the proof, refuses it (`src/run/chosen.rs`).
 
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::material_interfaces;
 use super::materials::Material;
 use super::peridynamics;
@@ -12,12 +12,12 @@ use super::selected_coupling::SelectedCoupling;
 use super::source::Span;
 use super::spec::{
     CouplingSpec, ElementsSpec, LocalSpec, NonlocalSpec, PeridynamicsSpec, PointsSpec, SceneSpec,
-    SpliceSpec, TruncatedSpec, WeightsSpec,
+    SpliceSpec, TruncatedSpec,
 };
 use super::zones::{self, Placed};
 use crate::mesh::Mesh;
-use crate::model::Zone;
-use crate::scene::points::Points;
+use crate::model::{PointSource, Zone};
+use crate::peridynamics::BondWeights;
 use crate::tensor::Vector;
 
 /// Distance, in spacings, by which faces may deviate from the lattice.
@@ -115,10 +115,9 @@ fn without_peridynamics(spec: &SceneSpec) -> Result<(), SceneError> {
         (None, Some(name)) => (name.span.clone(), format!("zones.bodies.{name}")),
         (None, None) => return Ok(()),
     };
-    Err(SceneError::new(
-        SceneErrorKind::Missing,
-        format!("the scene draws `{what}` and has no [peridynamics] to fill it with"),
-    )
+    Err(SceneError::missing(format!(
+        "the scene draws `{what}` and has no [peridynamics] to fill it with"
+    ))
     .label(span, "would be finite elements")
     .help(
         "add [peridynamics] with horizon = ..., or take the zone out, or type coupling = \"local\"",
@@ -163,7 +162,7 @@ fn obstacle<const D: usize>(
     if matches!(p.points, Some(PointsSpec::Cells)) {
         return certain("points that are no lattice");
     }
-    if p.weights == WeightsSpec::Fitted {
+    if p.weights == BondWeights::Fitted {
         return certain("weights that are fitted family by family");
     }
     if p.horizon_varies() {
@@ -175,7 +174,7 @@ fn obstacle<const D: usize>(
         return certain("points of several materials in space, or of a law with dilatations");
     }
     let lattice = peridynamics::peridynamics(p, truncated.traits.lattice, mesh, &zones)?;
-    let Points::Lattice { spacing, origin } = lattice.points else {
+    let PointSource::Lattice { spacing, origin } = lattice.points else {
         return certain("points that are no lattice");
     };
     if let Some(reason) = doubt {

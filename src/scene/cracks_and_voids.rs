@@ -1,6 +1,6 @@
 //! Voids and cracks of a scene.
 
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::places::extent;
 use super::region;
 use super::spec::{SceneSpec, ShapeSpec, VoidSpec};
@@ -27,25 +27,19 @@ fn void_shape<const D: usize>(
         shape,
         Shape::Box { .. } | Shape::Ball { .. } | Shape::Polygon(_)
     ) {
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`{place}` has no volume"),
-        )
-        .label(name.span.clone(), "nothing lies inside")
-        .help("use `box`, `ball` or, in 2D, `polygon`; a surface is a crack: [cracks.NAME]"));
+        return Err(SceneError::wrong_value(format!("`{place}` has no volume"))
+            .label(name.span.clone(), "nothing lies inside")
+            .help("use `box`, `ball` or, in 2D, `polygon`; a surface is a crack: [cracks.NAME]"));
     }
     let inside = |c: &usize| shape.signed_distance(&mesh.centroid(*c)) < 0.0;
     if let Some(c) = (0..mesh.cell_count())
         .filter(|&c| zones[c] != Zone::Nonlocal)
         .find(inside)
     {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!(
-                "`{place}` covers cell {c} at {:?}, which is not nonlocal",
-                mesh.centroid(c).as_slice()
-            ),
-        )
+        return Err(SceneError::conflict(format!(
+            "`{place}` covers cell {c} at {:?}, which is not nonlocal",
+            mesh.centroid(c).as_slice()
+        ))
         .label(name.span.clone(), "finite elements cannot be emptied")
         .help("enlarge [zones.nonlocal] around the void, or leave it out of the mesh (cutouts)"));
     }
@@ -78,15 +72,12 @@ pub(crate) fn obstacles<const D: usize>(
                 | (Shape::Polygon(_), _, 3)
         );
         if !thin {
-            return Err(SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!("`{place}` is no surface in a scene of dimension {D}"),
-            )
-            .label(name.span.clone(), "cuts nothing")
-            .help([
-                "give a point: point = 0.5",
-                "give a segment = { from, to } or a polyline; what has an area is a void: [voids.NAME]",
-                "give a plane polygon = [[x, y, z], ...]; what has a volume is a void: [voids.NAME]",
+            return Err(SceneError::wrong_value(format!("`{place}` is no surface in a scene of dimension {D}"))
+                .label(name.span.clone(), "cuts nothing")
+                .help([
+                    "give a point: point = 0.5",
+                    "give a segment = { from, to } or a polyline; what has an area is a void: [voids.NAME]",
+                    "give a plane polygon = [[x, y, z], ...]; what has a volume is a void: [voids.NAME]",
             ][D - 1]));
         }
         let samples = samples(&shape);
@@ -96,20 +87,16 @@ pub(crate) fn obstacles<const D: usize>(
             .filter_map(|x| locator.locate(mesh, x, tolerance).map(|l| (*x, l.cell)))
             .collect();
         if cells.is_empty() {
-            return Err(SceneError::new(
-                SceneErrorKind::Empty,
-                format!("`{place}` lies outside the mesh"),
-            )
-            .label(name.span.clone(), "cuts nothing")
-            .help(extent(mesh)));
+            return Err(
+                SceneError::empty(format!("`{place}` lies outside the mesh"))
+                    .label(name.span.clone(), "cuts nothing")
+                    .help(extent(mesh)),
+            );
         }
         if let Some((x, _)) = cells.iter().find(|(_, cell)| zones[*cell] == Zone::Local) {
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                format!("`{place}` passes through the local zone at {:?}", x.as_slice()),
-            )
-            .label(name.span.clone(), "finite elements cannot be cut")
-            .help("enlarge [zones.nonlocal], for example near = { segment = ..., within = 3 horizons }"));
+            return Err(SceneError::conflict(format!("`{place}` passes through the local zone at {:?}", x.as_slice()))
+                .label(name.span.clone(), "finite elements cannot be cut")
+                .help("enlarge [zones.nonlocal], for example near = { segment = ..., within = 3 horizons }"));
         }
         barriers.push(Barrier::Crack(shape));
     }

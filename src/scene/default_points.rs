@@ -9,9 +9,8 @@
 
 use super::spec::LatticeStart;
 use crate::mesh::Mesh;
-use crate::model::Zone;
+use crate::model::{PointSource, Zone};
 use crate::observe::report::number;
-use crate::scene::points::Points;
 use crate::tensor::Vector;
 
 /// Spacings in a horizon, where nothing else decides.
@@ -33,7 +32,7 @@ pub(crate) fn default_points<const D: usize>(
     zones: &[Zone],
     start: LatticeStart,
     horizon: impl Fn(usize) -> f64,
-) -> (Points<D>, String) {
+) -> (PointSource<D>, String) {
     let everywhere = !zones.iter().any(|z| *z != Zone::Local);
     let cells: Vec<usize> = (0..mesh.cell_count())
         .filter(|&c| everywhere || zones[c] != Zone::Local)
@@ -48,7 +47,7 @@ pub(crate) fn default_points<const D: usize>(
         // refused where horizons are checked, with the place
         let spacing = (high - low).amax();
         return (
-            Points::Lattice {
+            PointSource::Lattice {
                 spacing,
                 origin: low,
             },
@@ -71,7 +70,7 @@ pub(crate) fn default_points<const D: usize>(
         "the scene leaves `points` out; {as_what}, {} spacings in a horizon",
         number(smallest / spacing)
     );
-    (Points::Lattice { spacing, origin }, why)
+    (PointSource::Lattice { spacing, origin }, why)
 }
 
 /// A third of the horizon, or what of it fits the smallest extent a whole number of times.

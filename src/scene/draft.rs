@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::bounds_checks;
 use super::condition_list;
 use super::conditions::Condition;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::impactors::{self, Impactor};
 use super::initial::Initial;
 use super::material_interfaces::MaterialInterface;
@@ -18,7 +18,7 @@ use super::meshing;
 use super::peridynamics::{self, Peridynamics};
 use super::solve::Solve;
 use super::spec::{
-    BondsSpec, CouplingSpec, ElementsSpec, InfluenceSpec, MaterialSpec, SceneSpec, ZonesNeeded,
+    CouplingSpec, ElementsSpec, InfluenceSpec, MaterialSpec, SceneSpec, ZonesNeeded,
 };
 use super::table_rows;
 use super::temperature::{self, Temperature};
@@ -32,13 +32,13 @@ use super::{
 };
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
-use crate::model::Zone;
+use crate::model::{PointSource, Zone};
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::provenance;
 use crate::observe::report::{components, number};
 use crate::observe::summary::Decision;
+use crate::peridynamics::bond_force::BondKinematics;
 use crate::peridynamics::{Influence, Law};
-use crate::scene::points::Points;
 use crate::scene::selected_coupling::SelectedCoupling;
 
 /// A scene that is validated but for its nonlocal zone, and for what follows from that.
@@ -68,11 +68,11 @@ impl<'a, const D: usize> Draft<'a, D> {
     /// A [`SceneError`] with place, value and remedy.
     pub fn new(
         spec: &'a SceneSpec,
-        kinematics: Kinematics,
         directory: &Path,
         name: &'a str,
         mut fingerprint: Fingerprint,
     ) -> Result<Self, SceneError> {
+        let kinematics = *spec.kinematics.get_ref();
         let solver = solver(spec)?;
         table_rows::read_files(&spec.tables, directory, &mut fingerprint)?;
         let mesh = meshing::build::<D>(&spec.mesh, directory, &spec.kinematics.span())?;
@@ -178,10 +178,10 @@ impl<'a, const D: usize> Draft<'a, D> {
         if self.spec.peridynamics.is_none()
             && !matches!(traits.zones, ZonesNeeded::Everywhere(Zone::Local))
         {
-            return Err(SceneError::new(
-                SceneErrorKind::Missing,
-                format!("coupling `{}` needs [peridynamics]", traits.name),
-            )
+            return Err(SceneError::missing(format!(
+                "coupling `{}` needs [peridynamics]",
+                traits.name
+            ))
             .label(selected.span.clone(), "has a peridynamic side")
             .help("add [peridynamics] with horizon = ..., or use coupling = \"local\""));
         }
@@ -248,7 +248,7 @@ impl<'a, const D: usize> Draft<'a, D> {
         coupling: &CouplingSpec,
         used: &[u16],
         law: &dyn Law<D>,
-        bonds: BondsSpec,
+        bonds: BondKinematics,
     ) -> Result<ElementsSpec, SceneError> {
         elements::elements(self.spec, coupling, (&self.materials, used), law, bonds)
     }
@@ -380,7 +380,7 @@ fn horizon_choice<const D: usize>(p: &Peridynamics<D>) -> Option<Decision> {
 
 /// Says where points lie that the scene does not place.
 fn points_choice<const D: usize>(p: &Peridynamics<D>) -> Option<Decision> {
-    let Points::Lattice { spacing, origin } = &p.points else {
+    let PointSource::Lattice { spacing, origin } = &p.points else {
         return None;
     };
     Some(Decision {
@@ -398,16 +398,10 @@ fn densities<const D: usize>(spec: &SceneSpec, found: &[Material<D>]) -> Result<
     let Some(light) = found.iter().find(|m| m.density <= 0.0) else {
         return Ok(());
     };
-    let span = spec
-        .materials
-        .get_key_value(light.name.as_str())
-        .map_or(0..0, |(k, _)| k.span.clone());
-    Err(SceneError::new(
-        SceneErrorKind::Missing,
-        format!("the material `{}` has no density, which [solve.explicit] needs", light.name),
-    )
-    .label(span, "has no inertia")
-    .help("add density = ..., in the units of the scene (kg/m³ beside N and m; t/mm³ beside N and mm)"))
+    let span = spec.span_of_material(&light.name);
+    Err(SceneError::missing(format!("the material `{}` has no density, which [solve.explicit] needs", light.name))
+        .label(span, "has no inertia")
+        .help("add density = ..., in the units of the scene (kg/m³ beside N and m; t/mm³ beside N and mm)"))
 }
 
 fn default_influence() -> Result<Influence, SceneError> {
@@ -437,12 +431,9 @@ fn solver(spec: &SceneSpec) -> Result<Solver, SceneError> {
     };
     let max_iterations = match &s.max_iterations {
         Some(n) if n.value == 0 => {
-            return Err(SceneError::new(
-                SceneErrorKind::WrongValue,
-                "`solver.max-iterations` is 0",
-            )
-            .label(n.span.clone(), "no iteration")
-            .help("allow at least 1; 500 suits most scenes"));
+            return Err(SceneError::wrong_value("`solver.max-iterations` is 0")
+                .label(n.span.clone(), "no iteration")
+                .help("allow at least 1; 500 suits most scenes"));
         }
         Some(n) => n.value,
         None => 500,

@@ -1,12 +1,12 @@
 //! Constitutive law of the finite elements of the points' materials, and its agreement with the rest of the scene.
 
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::materials::Material;
-use super::spec::{
-    BondsSpec, CouplingSpec, CutBondsSpec, ElementsSpec, SceneSpec, WeightsSpec, ZonesNeeded,
-};
+use super::spec::{CouplingSpec, ElementsSpec, SceneSpec, ZonesNeeded};
+use crate::coupling::truncated::CutBonds;
 use crate::model::Zone;
-use crate::peridynamics::Law;
+use crate::peridynamics::bond_force::BondKinematics;
+use crate::peridynamics::{BondWeights, Law};
 
 /// Returns the typed law of the elements; those that follow the bonds need a coupling that carries their stress, and one lattice of bonds without memory.
 ///
@@ -17,7 +17,7 @@ pub(crate) fn elements<const D: usize>(
     coupling: &CouplingSpec,
     (materials, used): (&[Material<D>], &[u16]),
     law: &dyn Law<D>,
-    bonds: BondsSpec,
+    bonds: BondKinematics,
 ) -> Result<ElementsSpec, SceneError> {
     let typed = spec.peridynamics.as_ref().and_then(|p| p.elements.as_ref());
     let Some(typed) = typed.filter(|typed| *typed.get_ref() == ElementsSpec::CauchyBorn) else {
@@ -31,10 +31,9 @@ pub(crate) fn elements<const D: usize>(
         .or_else(|| families_that_differ(spec));
     match obstacle {
         None => Ok(ElementsSpec::CauchyBorn),
-        Some((why, help)) => Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`peridynamics.elements` is \"cauchy-born\", and {why}"),
-        )
+        Some((why, help)) => Err(SceneError::conflict(format!(
+            "`peridynamics.elements` is \"cauchy-born\", and {why}"
+        ))
         .label(typed.span(), "of which bonds?")
         .help(help)),
     }
@@ -79,7 +78,7 @@ fn coupling_without_stress<const D: usize>(
 fn law_without_stress<const D: usize>(
     (materials, used): (&[Material<D>], &[u16]),
     law: &dyn Law<D>,
-    bonds: BondsSpec,
+    bonds: BondKinematics,
 ) -> Obstacle {
     let mut own = used.iter().map(|&m| &materials[usize::from(m)]);
     if let Some(own) = own.find(|m| m.law.local_law().is_some()) {
@@ -100,7 +99,7 @@ fn law_without_stress<const D: usize>(
         let help = "use a bond-based, hardening, lps or pals material, or elements = \"linear\"";
         return Some((why, help));
     }
-    (bonds == BondsSpec::Linear && law.is_linear()).then(|| {
+    (bonds == BondKinematics::Linear && law.is_linear()).then(|| {
         (
             "the bonds themselves are linear, so that it changes nothing".to_owned(),
             "add bonds = \"exact\", or remove this",
@@ -119,7 +118,7 @@ fn families_that_differ(spec: &SceneSpec) -> Obstacle {
     let p = spec.peridynamics.as_ref()?;
     let why = if p.horizon_varies() {
         "the horizon varies, so that there is no one family"
-    } else if p.weights == WeightsSpec::Fitted {
+    } else if p.weights == BondWeights::Fitted {
         "weights that are fitted differ from family to family"
     } else {
         return None;
@@ -131,11 +130,11 @@ fn families_that_differ(spec: &SceneSpec) -> Obstacle {
 
 /// Tests that bonds that end on faces rotate with the body; the error says why they do not.
 fn truncated_bonds<const D: usize>(
-    cut_bonds: Option<CutBondsSpec>,
+    cut_bonds: Option<CutBonds>,
     law: &dyn Law<D>,
     accelerated: bool,
 ) -> Result<(), String> {
-    if cut_bonds == Some(CutBondsSpec::Linear) {
+    if cut_bonds == Some(CutBonds::Linear) {
         return Err("cut-bonds = \"linear\" keeps the bonds at the seam from rotating".to_owned());
     }
     match (law.accelerator(), accelerated) {

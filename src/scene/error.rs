@@ -61,6 +61,32 @@ pub struct Excerpt {
     pub line: usize,
 }
 
+/// Declares the mistakes by their kind.
+macro_rules! kinds {
+    ($($name:ident: $kind:ident),* $(,)?) => {
+        impl SceneError {
+            $(
+                #[doc = concat!("A mistake of the kind [`SceneErrorKind::", stringify!($kind), "`], without a place yet.")]
+                pub fn $name(message: impl Into<String>) -> Self {
+                    Self::new(SceneErrorKind::$kind, message)
+                }
+            )*
+        }
+    };
+}
+
+kinds! {
+    syntax: Syntax,
+    wrong_value: WrongValue,
+    missing: Missing,
+    choice: Choice,
+    dimension: Dimension,
+    conflict: Conflict,
+    empty: Empty,
+    mesh: Mesh,
+    file: File,
+}
+
 impl SceneError {
     /// A mistake without a place yet.
     pub fn new(kind: SceneErrorKind, message: impl Into<String>) -> Self {

@@ -1,25 +1,24 @@
 //! Deformation and fracture of the bonds of a validated scene, and contact of its points.
 
 use super::bounds_checks;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::material_interfaces::MaterialInterface;
 use super::materials::Material;
 use super::region::{Region, region};
-use super::spec::{
-    BondsSpec, CalibrationSpec, ContactSpec, EdgeSpec, PrecisionSpec, SceneSpec, SolveSpec,
-    WeightsSpec,
-};
+use super::spec::{CalibrationSpec, ContactSpec, EdgeSpec, SceneSpec, SolveSpec};
+use crate::coupling::semidiscrete::behaviour::ContactBehaviour;
 use crate::mesh::Mesh;
-use crate::peridynamics::bond_force::BondSoftening;
+use crate::peridynamics::BondWeights;
+use crate::peridynamics::bond_force::{BondKinematics, BondSoftening, Storage};
 use crate::peridynamics::failure::Fracture;
 
 /// Deformation and fracture of bonds, and contact. A scene that names neither fracture nor contact has none, and pays for none.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Breaking<const D: usize> {
     /// Dependence of the bond force on the displacement.
-    pub bonds: BondsSpec,
+    pub bonds: BondKinematics,
     /// Storage of the weights of bonds in scenes in time and load steps.
-    pub precision: PrecisionSpec,
+    pub precision: Storage,
     /// Fracture criterion of the peridynamic material, or else of an interface, if there is one.
     pub fracture: Option<Fracture>,
     /// Fracture criteria of each material and of the interfaces, where points have several materials.
@@ -35,7 +34,7 @@ pub struct Breaking<const D: usize> {
     /// Action when damage reaches the edge of the nonlocal zone.
     pub at_edge: EdgeSpec,
     /// Short-range contact.
-    pub contact: Option<Contact>,
+    pub contact: Option<ContactBehaviour>,
 }
 
 impl<const D: usize> Breaking<D> {
@@ -56,15 +55,6 @@ pub struct FractureOfMaterials {
     pub interfaces: Vec<MaterialInterface>,
 }
 
-/// Short-range contact.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Contact {
-    /// Distance below which points repel each other, over the spacing.
-    pub radius_factor: f64,
-    /// Stiffness of the repulsion over that of a bond.
-    pub stiffness_factor: f64,
-}
-
 /// Refuses keys about broken bonds where no bond breaks.
 fn refuse_needless<const D: usize>(
     spec: &SceneSpec,
@@ -73,13 +63,10 @@ fn refuse_needless<const D: usize>(
 ) -> Result<(), SceneError> {
     if !breaks {
         let needless = |span, what: &str| {
-            SceneError::new(
-                SceneErrorKind::Conflict,
-                format!(
-                    "{what}, but no bond of the material `{}` breaks",
-                    material.name
-                ),
-            )
+            SceneError::conflict(format!(
+                "{what}, but no bond of the material `{}` breaks",
+                material.name
+            ))
             .label(span, "needs a material that breaks")
             .help(format!(
                 "add fracture-energy or critical-stretch to [materials.{}.…], or remove this",
@@ -111,20 +98,17 @@ fn bonds_of<const D: usize>(
     material: &Material<D>,
     breaks: bool,
     is_static: bool,
-) -> Result<BondsSpec, SceneError> {
+) -> Result<BondKinematics, SceneError> {
     let typed = spec.peridynamics.as_ref().and_then(|p| p.bonds.as_ref());
     let is_objective = (material.law.force_state()).is_some_and(|f| f.is_objective());
     Ok(match typed {
         Some(bonds) => {
-            if *bonds.get_ref() == BondsSpec::Exact && !is_objective {
-                return Err(SceneError::new(
-                    SceneErrorKind::Conflict,
-                    format!(
-                        "`peridynamics.bonds` is \"exact\", and the material `{}` is a {} law",
-                        material.name,
-                        material.law.name()
-                    ),
-                )
+            if *bonds.get_ref() == BondKinematics::Exact && !is_objective {
+                return Err(SceneError::conflict(format!(
+                    "`peridynamics.bonds` is \"exact\", and the material `{}` is a {} law",
+                    material.name,
+                    material.law.name()
+                ))
                 .label(
                     bonds.span(),
                     "its force does not follow the stretch of a bond",
@@ -135,9 +119,9 @@ fn bonds_of<const D: usize>(
         }
         // nothing breaks where nothing moves, and a law for small strains stays linear
         None if !is_static && is_objective && (breaks || spec.contact.is_some()) => {
-            BondsSpec::Exact
+            BondKinematics::Exact
         }
-        None => BondsSpec::Linear,
+        None => BondKinematics::Linear,
     })
 }
 
@@ -207,7 +191,7 @@ fn softening_of<const D: usize>(
         ),
         (spec.temperature.is_some(), "their temperature changes"),
         (
-            weights == Some(WeightsSpec::Fitted),
+            weights == Some(BondWeights::Fitted),
             "their weights are fitted, and differ between their ends",
         ),
     ];
@@ -225,7 +209,7 @@ fn softening_of<const D: usize>(
             "bonds of the material `{}` soften, but {against}",
             material.name
         );
-        return Err(SceneError::new(SceneErrorKind::Conflict, text)
+        return Err(SceneError::conflict(text)
             .label(name.map_or(0..0, |name| name.span.clone()), "softens")
             .help("type softening = 1, for bonds that break at once"));
     }
@@ -261,13 +245,10 @@ pub(crate) fn breaking<const D: usize>(
                 || interfaces.iter().any(|i| has_energy(i.fracture)));
     let is_of_stretch = fracture.is_none_or(Fracture::is_of_stretch);
     if let (Some(typed), false, true) = (calibration, has_energy, is_of_stretch) {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!(
-                "`peridynamics.calibration` is set, but the material `{}` has no fracture energy",
-                material.name
-            ),
-        )
+        return Err(SceneError::conflict(format!(
+            "`peridynamics.calibration` is set, but the material `{}` has no fracture energy",
+            material.name
+        ))
         .label(typed.span(), "of what?")
         .help("give the material a fracture-energy, or remove this"));
     }
@@ -283,8 +264,7 @@ pub(crate) fn breaking<const D: usize>(
         .as_ref()
         .and_then(|p| p.precision.as_ref());
     if let (Some(precision), true) = (precision, is_static) {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
+        return Err(SceneError::conflict(
             "`peridynamics.precision` is set, and nothing moves".to_owned(),
         )
         .label(
@@ -295,7 +275,7 @@ pub(crate) fn breaking<const D: usize>(
     }
     Ok(Breaking {
         bonds,
-        precision: precision.map_or(PrecisionSpec::Double, |p| *p.get_ref()),
+        precision: precision.map_or(Storage::Double, |p| *p.get_ref()),
         fracture,
         several: (used.len() > 1).then(|| FractureOfMaterials {
             of: materials
@@ -318,8 +298,8 @@ pub(crate) fn breaking<const D: usize>(
     })
 }
 
-fn contact(spec: &ContactSpec) -> Result<Contact, SceneError> {
-    let radius_factor = match &spec.radius_factor {
+fn contact(spec: &ContactSpec) -> Result<ContactBehaviour, SceneError> {
+    let approach = match &spec.radius_factor {
         Some(r) => bounds_checks::within(
             "contact.radius-factor",
             r,
@@ -329,12 +309,12 @@ fn contact(spec: &ContactSpec) -> Result<Contact, SceneError> {
         )?,
         None => 0.9,
     };
-    let stiffness_factor = match &spec.stiffness_factor {
+    let stiffness = match &spec.stiffness_factor {
         Some(s) => bounds_checks::positive("contact.stiffness-factor", s)?,
         None => 15.0,
     };
-    Ok(Contact {
-        radius_factor,
-        stiffness_factor,
+    Ok(ContactBehaviour {
+        approach,
+        stiffness,
     })
 }

@@ -1,8 +1,8 @@
 //! Rigid impactors of a validated scene.
 
 use super::bounds_checks;
-use super::components::Components;
-use super::error::{SceneError, SceneErrorKind, quoted};
+use super::components::{Components, no_such_axis};
+use super::error::{SceneError, quoted};
 use super::expression::Expression;
 use super::region::position;
 use super::solve::{Clock, Solve};
@@ -10,7 +10,7 @@ use super::source::Span;
 use super::spec::{ImpactorMotionSpec, ImpactorSpec, SceneSpec};
 use super::value::{Coordinates, Text};
 use crate::coupling::ImpactorShape;
-use crate::tensor::Vector;
+use crate::tensor::{AXES, Vector};
 
 /// A rigid body that strikes or presses.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,8 +65,6 @@ const IN_MOTION: f64 = 0.5;
 /// Factor in load steps, which have no stable step: sites penetrate by a twentieth of what they would.
 const IN_LOAD_STEPS: f64 = 10.0;
 
-const AXES: [&str; 3] = ["x", "y", "z"];
-
 /// All impactors.
 pub(crate) fn impactors<const D: usize>(
     spec: &SceneSpec,
@@ -102,9 +100,7 @@ pub(crate) fn impactors<const D: usize>(
 }
 
 fn refused(message: String, span: Span, label: &str, help: &str) -> SceneError {
-    SceneError::new(SceneErrorKind::Conflict, message)
-        .label(span, label)
-        .help(help)
+    SceneError::conflict(message).label(span, label).help(help)
 }
 
 /// Refuses impactors in scenes that cannot have them.
@@ -174,12 +170,9 @@ fn direction<const D: usize>(place: &str, typed: &Coordinates) -> Result<Vector<
     let unit = given.try_normalize(1e-300);
     unit.filter(|n| n.iter().all(|n| n.is_finite()))
         .ok_or_else(|| {
-            SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!("`{place}` has no direction"),
-            )
-            .label(typed.span.clone(), "zero")
-            .help("write a direction, along the last axis say, with a component of 1")
+            SceneError::wrong_value(format!("`{place}` has no direction"))
+                .label(typed.span.clone(), "zero")
+                .help("write a direction, along the last axis say, with a component of 1")
         })
 }
 
@@ -199,12 +192,13 @@ fn shape<const D: usize>(
     if let Some(c) = &typed.cylinder {
         let place = format!("{place}.cylinder");
         if D < 3 {
-            return Err(SceneError::new(
-                SceneErrorKind::Dimension,
-                format!("`{place}` in a scene of dimension {D}"),
-            )
-            .label(name.span.clone(), "has an axis in space")
-            .help("write sphere = { center = ..., radius = ... }, which is a disc in a plane"));
+            return Err(
+                SceneError::dimension(format!("`{place}` in a scene of dimension {D}"))
+                    .label(name.span.clone(), "has an axis in space")
+                    .help(
+                        "write sphere = { center = ..., radius = ... }, which is a disc in a plane",
+                    ),
+            );
         }
         let shape = ImpactorShape::Cylinder {
             point: position(&format!("{place}.point"), &c.point)?,
@@ -224,13 +218,10 @@ fn shape<const D: usize>(
     let names: Vec<&str> = shapes.iter().map(|(n, _)| *n).collect();
     match shapes.pop() {
         Some((_, shape)) if shapes.is_empty() => Ok(shape),
-        _ => Err(SceneError::new(
-            SceneErrorKind::Choice,
-            match names.as_slice() {
-                [] => format!("`{place}` has no shape"),
-                _ => format!("`{place}` has {} at once", quoted(&names)),
-            },
-        )
+        _ => Err(SceneError::choice(match names.as_slice() {
+            [] => format!("`{place}` has no shape"),
+            _ => format!("`{place}` has {} at once", quoted(&names)),
+        })
         .label(name.span.clone(), "of what shape?")
         .help("give exactly one of `sphere`, `cylinder`, `plane`")),
     }
@@ -320,12 +311,7 @@ fn components<const D: usize>(
         let Some(e) = e else { continue };
         let at = format!("{place}.{}", AXES[k]);
         if k >= D {
-            return Err(SceneError::new(
-                SceneErrorKind::Dimension,
-                format!("`{at}` in a scene of dimension {D}"),
-            )
-            .label(e.span.clone(), "no such axis")
-            .help(format!("remove `{}`", AXES[k])));
+            return Err(no_such_axis::<D>(place, k, &e.span));
         }
         if e.function().is_some() || e.depends_on_position() {
             return Err(refused(
@@ -344,12 +330,9 @@ fn components<const D: usize>(
                 true => format!(" at t = {t}"),
                 false => String::new(),
             };
-            return Err(SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!("`{at}` is {v}{when}"),
-            )
-            .label(e.span.clone(), "no finite number there")
-            .help("choose between branches with if(condition, a, b)"));
+            return Err(SceneError::wrong_value(format!("`{at}` is {v}{when}"))
+                .label(e.span.clone(), "no finite number there")
+                .help("choose between branches with if(condition, a, b)"));
         }
     }
     Ok(Components(std::array::from_fn(|k| given[k].clone())))

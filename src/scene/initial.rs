@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::components::{Components, components, finite};
-use super::error::{SceneError, SceneErrorKind};
+use super::components::{Components, components};
+use super::condition_at::ConditionAt;
+use super::error::SceneError;
 use super::places::inside;
 use super::region::Region;
 use super::solve::{Clock, Pacing, still};
@@ -47,12 +48,11 @@ pub(crate) fn initial<const D: usize>(
         };
         let place = format!("initial.{name}.{word}");
         if clock.pacing != Pacing::Moving {
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                format!("`{place}` in a scene that does not move"),
-            )
-            .label(name.span.clone(), "there is no time zero")
-            .help("add [solve.explicit] with duration = ..., or remove it"));
+            return Err(
+                SceneError::conflict(format!("`{place}` in a scene that does not move"))
+                    .label(name.span.clone(), "there is no time zero")
+                    .help("add [solve.explicit] with duration = ..., or remove it"),
+            );
         }
         let InitialFieldSpec {
             inside: shape,
@@ -76,7 +76,13 @@ pub(crate) fn initial<const D: usize>(
         let selected = region.select_nodes(mesh);
         let within = mesh.nodes.iter().zip(selected);
         let within = within.filter_map(|(x, selected)| selected.then_some(*x));
-        finite(&place, name, &components, clock, within)?;
+        let at = ConditionAt {
+            place: &place,
+            name,
+            mesh,
+            clock,
+        };
+        at.finite(&components, within)?;
         found.push(Initial {
             name: name.value.clone(),
             kind,

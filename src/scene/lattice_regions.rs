@@ -1,15 +1,14 @@
 //! Parts of the nonlocal zone with a horizon and a lattice of their own, and the layers of elements between them.
 
 use super::bounds_checks;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::peridynamics::Peridynamics;
 use super::places::extent;
 use super::region;
 use super::spec::{BodySpec, CouplingTraits, LatticeStart, SceneSpec};
 use super::value::Text;
 use crate::mesh::Mesh;
-use crate::model::{Lattice, Zone};
-use crate::scene::points::Points;
+use crate::model::{Lattice, PointSource, Zone};
 
 /// The cells, the spacing and the horizon of a body.
 fn body_region<const D: usize>(
@@ -21,10 +20,9 @@ fn body_region<const D: usize>(
     let spacing = bounds_checks::positive(&format!("{place}.spacing"), &body.spacing)?;
     let horizon = bounds_checks::positive(&format!("{place}.horizon"), &body.horizon)?;
     if horizon < spacing * (1.0 - 1e-9) {
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`{place}.horizon` is {horizon}, below the spacing {spacing} of its points"),
-        )
+        return Err(SceneError::wrong_value(format!(
+            "`{place}.horizon` is {horizon}, below the spacing {spacing} of its points"
+        ))
         .label(body.horizon.span.clone(), "no point would have a neighbour")
         .help("make it two to six times the spacing"));
     }
@@ -45,10 +43,9 @@ fn refuse_empty_zones<const D: usize>(
     {
         let holds = |c: usize| zones[c] == Zone::Nonlocal && usize::from(of_cell[c]) == l;
         if !(0..mesh.cell_count()).any(holds) {
-            return Err(SceneError::new(
-                SceneErrorKind::Empty,
-                format!("the layers of elements between bodies take every cell of {name}"),
-            )
+            return Err(SceneError::empty(format!(
+                "the layers of elements between bodies take every cell of {name}"
+            ))
             .label(
                 first.span.clone(),
                 "bodies are kept apart by a layer one cell thick",
@@ -71,20 +68,17 @@ pub(crate) fn bodies<const D: usize>(
         return Ok(p);
     };
     if traits.lattice != LatticeStart::Halfway {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!(
-                "`zones.bodies` needs bonds that end on faces; coupling `{}` completes families across a seam",
-                traits.name
-            ),
-        )
+        return Err(SceneError::conflict(format!(
+            "`zones.bodies` needs bonds that end on faces; coupling `{}` completes families across a seam",
+            traits.name
+        ))
         .label(first.span.clone(), "has a horizon of its own")
         .help("use coupling = \"truncated\", or a horizon in x, y, z"));
     }
-    let (Points::Lattice { spacing, origin }, Some(horizon)) = (&p.points, p.horizon.as_constant())
+    let (PointSource::Lattice { spacing, origin }, Some(horizon)) =
+        (&p.points, p.horizon.as_constant())
     else {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
+        return Err(SceneError::conflict(
             "`zones.bodies` needs a lattice and one horizon in the rest of the nonlocal zone too",
         )
         .label(first.span.clone(), "is a body of its own")
@@ -105,10 +99,9 @@ pub(crate) fn bodies<const D: usize>(
             any = true;
         }
         if !any {
-            return Err(SceneError::new(
-                SceneErrorKind::Empty,
-                format!("`{place}` is empty: no cell of the nonlocal zone has its centroid inside"),
-            )
+            return Err(SceneError::empty(format!(
+                "`{place}` is empty: no cell of the nonlocal zone has its centroid inside"
+            ))
             .label(name.span.clone(), "selects no cell")
             .help(format!("move or enlarge it; {}", extent(mesh))));
         }
@@ -121,7 +114,7 @@ pub(crate) fn bodies<const D: usize>(
     add_layers(mesh, zones, &of_cell);
     refuse_empty_zones(spec, first, mesh, zones, &of_cell)?;
     Ok(Peridynamics {
-        points: Points::Lattices { lattices, of_cell },
+        points: PointSource::Lattices { lattices, of_cell },
         ..p
     })
 }

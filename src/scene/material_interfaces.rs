@@ -8,13 +8,12 @@ use super::error::{SceneError, SceneErrorKind};
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
 use super::source::Span;
-use super::spec::{CouplingSpec, MaterialInterfaceSpec, SceneSpec, StiffnessSpec};
+use super::spec::{CouplingSpec, MaterialInterfaceSpec, SceneSpec};
 use super::value::Text;
-use crate::model::Zone;
+use crate::model::{PointSource, Zone};
 use crate::observe::summary::Decision;
 use crate::peridynamics::failure::{self, Fracture};
 use crate::peridynamics::{Law, Several, StiffnessMean};
-use crate::scene::points::Points;
 
 /// Bonds between two materials, as a scene types them.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,13 +48,10 @@ pub(crate) fn interfaces<const D: usize>(
         let interface = interface(name, typed, materials)?;
         let [a, b] = interface.between;
         if let Some(other) = MaterialInterface::of(&found, a, b) {
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                format!(
-                    "the interfaces `{}` and `{name}` are of the same two materials",
-                    other.name
-                ),
-            )
+            return Err(SceneError::conflict(format!(
+                "the interfaces `{}` and `{name}` are of the same two materials",
+                other.name
+            ))
             .label(name.span.clone(), "a second rule for these bonds")
             .help("keep one of them"));
         }
@@ -73,32 +69,28 @@ fn interface<const D: usize>(
         let place = materials.iter().position(|m| m.name == text.value);
         place.map(|n| n as u16).ok_or_else(|| {
             let known: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
-            SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!(
-                    "`interfaces.{name}.between` names the material `{}`",
-                    text.value
-                ),
-            )
+            SceneError::wrong_value(format!(
+                "`interfaces.{name}.between` names the material `{}`",
+                text.value
+            ))
             .label(text.span.clone(), "not a material of this scene")
             .help(format!("use two of {}", known.join(", ")))
         })
     };
     let [first, second] = &typed.between[..] else {
         let count = typed.between.len();
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`interfaces.{name}.between` names {count} materials"),
-        )
+        return Err(SceneError::wrong_value(format!(
+            "`interfaces.{name}.between` names {count} materials"
+        ))
         .label(name.span.clone(), "bonds join two")
         .help("name two materials, and add a table for each other pair"));
     };
     let (a, b) = (number(first)?, number(second)?);
     if a == b {
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`interfaces.{name}.between` names `{}` twice", first.value),
-        )
+        return Err(SceneError::wrong_value(format!(
+            "`interfaces.{name}.between` names `{}` twice",
+            first.value
+        ))
         .label(second.span.clone(), "the same material")
         .help("name two different ones"));
     }
@@ -108,23 +100,17 @@ fn interface<const D: usize>(
         .as_ref()
         .filter(|_| !law.linearised().is_pairwise())
     {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!(
-                "`interfaces.{name}.stiffness` is set, and the points of a {} have force states of their own",
-                law.name()
-            ),
-        )
+        return Err(SceneError::conflict(format!(
+            "`interfaces.{name}.stiffness` is set, and the points of a {} have force states of their own",
+            law.name()
+        ))
         .label(stiffness.span(), "of bonds that have half of their stiffness from either end")
         .help("remove it, or use bond-based materials"));
     }
     Ok(MaterialInterface {
         name: name.value.clone(),
         between: [a.min(b), a.max(b)],
-        mean: match typed.stiffness.as_ref().map(|s| *s.get_ref()) {
-            None | Some(StiffnessSpec::HarmonicMean) => StiffnessMean::Harmonic,
-            Some(StiffnessSpec::ArithmeticMean) => StiffnessMean::Arithmetic,
-        },
+        mean: (typed.stiffness.as_ref()).map_or(StiffnessMean::Harmonic, |s| *s.get_ref()),
         fracture: fracture(name, typed, law.as_ref())?,
     })
 }
@@ -136,9 +122,7 @@ fn fracture<const D: usize>(
 ) -> Result<Option<Fracture>, SceneError> {
     let place = |key: &str| format!("interfaces.{name}.{key}");
     let refused = |span: Span, message: String, label: &str, help: &str| {
-        Err(SceneError::new(SceneErrorKind::Conflict, message)
-            .label(span, label)
-            .help(help))
+        Err(SceneError::conflict(message).label(span, label).help(help))
     };
     let found = match (&typed.fracture_energy, &typed.critical_stretch) {
         (None, None) => return Ok(None),
@@ -225,27 +209,19 @@ pub(crate) fn law_of_points<const D: usize>(
                 &materials[usize::from(no.first)],
                 &materials[usize::from(no.second)],
             );
-            Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                format!(
-                    "the materials `{}` ({}) and `{}` ({}) both have points: {}",
-                    a.name,
-                    a.law.name(),
-                    b.name,
-                    b.law.name(),
-                    no.why
-                ),
-            )
-            .label(span_of(spec, &a.name), "one")
-            .label(span_of(spec, &b.name), "another")
+            Err(SceneError::conflict(format!(
+                "the materials `{}` ({}) and `{}` ({}) both have points: {}",
+                a.name,
+                a.law.name(),
+                b.name,
+                b.law.name(),
+                no.why
+            ))
+            .label(spec.span_of_material(&a.name), "one")
+            .label(spec.span_of_material(&b.name), "another")
             .help("keep the nonlocal and transition zones within one of them, or give both the same law; a softening-bond does not mix"))
         }
     }
-}
-
-fn span_of(spec: &SceneSpec, name: &str) -> Span {
-    let found = spec.materials.get_key_value(name);
-    found.map_or(0..0, |(key, _)| key.span.clone())
 }
 
 /// Says which materials points have, and what their bonds are between two, if they have several.
@@ -324,8 +300,8 @@ impl<const D: usize> Pair<'_, D> {
             SceneErrorKind::Later,
             format!("points have the materials `{a}` and `{b}`, and {what}"),
         )
-        .label(span_of(self.spec, a), "one")
-        .label(span_of(self.spec, b), why)
+        .label(self.spec.span_of_material(a), "one")
+        .label(self.spec.span_of_material(b), why)
         .help(help)
     }
 
@@ -398,7 +374,7 @@ pub(crate) fn check<const D: usize>(
         ));
     }
     let Some(p) = p else { return Ok(()) };
-    if matches!(p.points, Points::Lattices { .. }) {
+    if matches!(p.points, PointSource::Lattices { .. }) {
         return Err(pair.refused(
             "`zones.bodies` is set",
             "another, and each body has a lattice of one",

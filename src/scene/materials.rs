@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::bounds_checks;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::peridynamics;
 use super::region::region;
 use super::spec::{CellsSpec, Given, MaterialSpec, MicromodulusSpec, ShapeSpec};
@@ -84,9 +84,11 @@ pub(crate) fn materials<const D: usize>(
     directory: &Path,
 ) -> Result<(Vec<Material<D>>, Vec<u16>), SceneError> {
     let Some(first) = spec.keys().next() else {
-        return Err(SceneError::new(SceneErrorKind::Missing, "`materials` names no material")
+        return Err(SceneError::missing("`materials` names no material")
             .label(0..0, "not found in this scene")
-            .help("add one, for example [materials.steel.lps] with youngs-modulus and poisson-ratio"));
+            .help(
+                "add one, for example [materials.steel.lps] with youngs-modulus and poisson-ratio",
+            ));
     };
     let mut found = Vec::with_capacity(spec.len());
     let mut owner: Vec<Option<u16>> = vec![None; mesh.cell_count()];
@@ -118,20 +120,18 @@ pub(crate) fn materials<const D: usize>(
                             ShapeSpec::Set(set) => set.span.clone(),
                             _ => name.span.clone(),
                         };
-                        return Err(SceneError::new(
-                            SceneErrorKind::Conflict,
-                            format!("cell {c} belongs to the materials `{other}` and `{name}`"),
-                        )
+                        return Err(SceneError::conflict(format!(
+                            "cell {c} belongs to the materials `{other}` and `{name}`"
+                        ))
                         .label(span, "this set overlaps another")
                         .help("make the sets of cells disjoint"));
                     }
                 }
             }
             (None, Some((other, _))) => {
-                return Err(SceneError::new(
-                    SceneErrorKind::Conflict,
-                    format!("the materials `{other}` and `{name}` both lack `cells`"),
-                )
+                return Err(SceneError::conflict(format!(
+                    "the materials `{other}` and `{name}` both lack `cells`"
+                ))
                 .label(name.span.clone(), "which cells?")
                 .label(other.span.clone(), "which cells?")
                 .help("give `cells = \"set\"` to all materials but one"));
@@ -145,10 +145,10 @@ pub(crate) fn materials<const D: usize>(
             Some(number) => material.push(number),
             None => {
                 let at = mesh.centroid(c);
-                return Err(SceneError::new(
-                    SceneErrorKind::Missing,
-                    format!("cell {c} at {:?} has no material", at.as_slice()),
-                )
+                return Err(SceneError::missing(format!(
+                    "cell {c} at {:?} has no material",
+                    at.as_slice()
+                ))
                 .label(first.span.clone(), "leaves cells out")
                 .help("add a material without `cells`: it fills what the others leave"));
             }
@@ -167,12 +167,9 @@ fn cells_of<const D: usize>(
     let found: Vec<usize> = (0..selected.len()).filter(|&c| selected[c]).collect();
     match found.is_empty() {
         false => Ok(found),
-        true => Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`materials.{name}.cells` holds no cell of the mesh"),
-        )
-        .label(name.span.clone(), "fills nothing")
-        .help("a shape holds the cells whose centroid lies inside; enlarge it, or remove the material")),
+        true => Err(SceneError::wrong_value(format!("`materials.{name}.cells` holds no cell of the mesh"))
+            .label(name.span.clone(), "fills nothing")
+            .help("a shape holds the cells whose centroid lies inside; enlarge it, or remove the material")),
     }
 }
 
@@ -214,15 +211,15 @@ fn law_and_cells<'a, const D: usize>(
             let known = m.law.kinematics();
             if !known.contains(&kinematics) {
                 let others: Vec<&str> = known.iter().map(|k| k.name()).collect();
-                return Err(SceneError::new(
-                    SceneErrorKind::Conflict,
-                    format!(
-                        "the law `{}` of the material `{name}` does not hold for kinematics = \"{}\"",
-                        m.law.key(),
-                        kinematics.name()
-                    ),
+                return Err(SceneError::conflict(format!(
+                    "the law `{}` of the material `{name}` does not hold for kinematics = \"{}\"",
+                    m.law.key(),
+                    kinematics.name()
+                ))
+                .label(
+                    name.span.clone(),
+                    "its stress out of the plane is not known",
                 )
-                .label(name.span.clone(), "its stress out of the plane is not known")
                 .help(format!("it holds for {}", others.join(", "))));
             }
             let values = named_values(name, m)?;
@@ -265,10 +262,10 @@ fn named_values(
         };
         (span, *value)
     });
-    Err(SceneError::new(
-        SceneErrorKind::Conflict,
-        format!("`materials.{name}.{}.{key}` is {value}", m.law.key()),
-    )
+    Err(SceneError::conflict(format!(
+        "`materials.{name}.{}.{key}` is {value}",
+        m.law.key()
+    ))
     .label(span, must)
     .help("see docs/scene.md, materials"))
 }
@@ -282,13 +279,10 @@ fn place_of_word(
 ) -> Result<f64, SceneError> {
     let place = parameter.words.iter().position(|w| *w == word.value);
     place.map(|place| place as f64).ok_or_else(|| {
-        SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!(
-                "`materials.{name}.{law}.{}` is \"{}\"",
-                parameter.key, word.value
-            ),
-        )
+        SceneError::wrong_value(format!(
+            "`materials.{name}.{law}.{}` is \"{}\"",
+            parameter.key, word.value
+        ))
         .label(word.span.clone(), "not one of its words")
         .help(format!("use one of \"{}\"", parameter.words.join("\", \"")))
     })
@@ -316,10 +310,10 @@ fn fracture(name: &Text, spec: &MaterialSpec) -> Result<Option<Fracture>, SceneE
         .as_ref()
         .is_some_and(|(c, _)| c.key() == FRACTURE_ENERGY.key());
     if let (Some(ratio), false) = (typed_ratio.filter(|r| r.value > 1.0), has_energy) {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`materials.{name}.{law}.softening` is {}", ratio.value),
-        )
+        return Err(SceneError::conflict(format!(
+            "`materials.{name}.{law}.softening` is {}",
+            ratio.value
+        ))
         .label(ratio.span.clone(), "bonds soften by a fracture energy")
         .help("add fracture-energy, or remove this"));
     }
@@ -327,14 +321,11 @@ fn fracture(name: &Text, spec: &MaterialSpec) -> Result<Option<Fracture>, SceneE
         return Ok(None);
     };
     if let Some((other, second)) = typed.next() {
-        return Err(SceneError::new(
-            SceneErrorKind::Choice,
-            format!(
-                "`materials.{name}.{law}` holds `{}`, `{}` at once",
-                criterion.key(),
-                other.key()
-            ),
-        )
+        return Err(SceneError::choice(format!(
+            "`materials.{name}.{law}` holds `{}`, `{}` at once",
+            criterion.key(),
+            other.key()
+        ))
         .label(number.span.clone(), "one")
         .label(second.span.clone(), "and another")
         .help("keep one of them: bonds break by one criterion"));
@@ -401,11 +392,8 @@ fn constants<const D: usize>(
         (None, Kinematics::PlaneStrain | Kinematics::Solid) => 0.25,
     };
     let failed = |error: crate::material::MaterialError| {
-        SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`materials.{name}`: {error}"),
-        )
-        .label(modulus.span.clone(), "of this material")
+        SceneError::wrong_value(format!("`materials.{name}`: {error}"))
+            .label(modulus.span.clone(), "of this material")
     };
     let elastic = Elastic::new(e, nu, density).map_err(failed)?;
     Ok((elastic.lame::<D>(kinematics).map_err(failed)?, density))

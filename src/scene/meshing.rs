@@ -6,16 +6,14 @@ use std::path::Path;
 use toml::Spanned;
 
 use super::bounds_checks;
-use super::error::{SceneError, SceneErrorKind, closest};
+use super::error::{SceneError, closest};
 use super::region::{corners, position};
 use super::source::Span;
-use super::spec::{
-    AxisSpec, CutoutSpec, FileMeshSpec, FileOrderSpec, MeshSpec, PlaneCellSpec, SolidCellSpec,
-};
+use super::spec::{AxisSpec, CutoutSpec, FileMeshSpec, MeshSpec, PlaneCellSpec, SolidCellSpec};
 use super::value::{Coordinates, Text};
 use crate::fem;
 use crate::mesh::generate::{Axis, CutOut, Grid, SIDES};
-use crate::mesh::{Mesh, MeshError, Order, quality, read};
+use crate::mesh::{Mesh, MeshError, quality, read};
 use crate::observe::checkpoint::Fingerprint;
 
 /// The most cells that a generated mesh may have: beyond it a typing error is likelier than a wish.
@@ -25,7 +23,7 @@ const MOST_CELLS: f64 = 1e8;
 fn from_file<const D: usize>(file: &FileMeshSpec, directory: &Path) -> Result<Mesh<D>, SceneError> {
     let path = directory.join(&file.path.value);
     let failed = |error: MeshError| {
-        let told = SceneError::new(SceneErrorKind::Mesh, format!("`mesh.file.path`: {error}"))
+        let told = SceneError::mesh(format!("`mesh.file.path`: {error}"))
             .label(file.path.span.clone(), "this mesh");
         match (&error, similar(&path)) {
             (MeshError::Open { .. }, Some(name)) => told.help(format!(
@@ -36,24 +34,20 @@ fn from_file<const D: usize>(file: &FileMeshSpec, directory: &Path) -> Result<Me
             _ => told,
         }
     };
-    let order = match file.order {
-        FileOrderSpec::Kept => Order::Kept,
-        FileOrderSpec::Linear => Order::Linear,
-    };
     let mesh: Mesh<D> = match &file.held {
-        Some(parts) => parts.mesh_of(order).map_err(|error| {
-            SceneError::new(SceneErrorKind::Mesh, format!("`mesh`: {error}"))
+        Some(parts) => parts.mesh_of(file.order).map_err(|error| {
+            SceneError::mesh(format!("`mesh`: {error}"))
                 .help("the scene was given this mesh in memory")
         })?,
         None => {
-            let mesh = read::read_of(&path, order).map_err(failed)?;
+            let mesh = read::read_of(&path, file.order).map_err(failed)?;
             quality::check(&mesh).map_err(failed)?;
             mesh
         }
     };
     // corners do not tell of a side that is curved too far
     fem::check(&mesh, |c| mesh.shapes[c].is_quadratic()).map_err(|error| {
-        SceneError::new(SceneErrorKind::Mesh, format!("`mesh.file.path`: {error}"))
+        SceneError::mesh(format!("`mesh.file.path`: {error}"))
             .label(file.path.span.clone(), "this mesh")
             .help("straighten the sides of the cell, refine the mesh there, or set order = \"linear\"")
     })?;
@@ -91,10 +85,9 @@ pub(crate) fn build<const D: usize>(
         if wanted == D {
             return Ok(());
         }
-        Err(SceneError::new(
-            SceneErrorKind::Dimension,
-            format!("`mesh.{name}` is of dimension {wanted}, the scene's kinematics are of dimension {D}"),
-        )
+        Err(SceneError::dimension(format!(
+            "`mesh.{name}` is of dimension {wanted}, the scene's kinematics are of dimension {D}"
+        ))
         .label(kinematics.clone(), format!("dimension {D}"))
         .label(min.span.clone(), format!("dimension {wanted}"))
         .help(format!(
@@ -146,7 +139,7 @@ pub(crate) fn build<const D: usize>(
     can_be_computed_with(&mesh)?;
     if !matches!(spec, MeshSpec::File(_)) {
         quality::check_thickness(&mesh).map_err(|error| {
-            SceneError::new(SceneErrorKind::Mesh, format!("`mesh`: {error}"))
+            SceneError::mesh(format!("`mesh`: {error}"))
                 .help("divide the longer axis into more cells, or the shorter into fewer")
         })?;
     }
@@ -164,11 +157,8 @@ fn can_be_computed_with<const D: usize>(mesh: &Mesh<D>) -> Result<(), SceneError
     if extent >= SMALLEST && farthest <= LARGEST {
         return Ok(());
     }
-    Err(SceneError::new(
-        SceneErrorKind::Mesh,
-        format!("`mesh` is {extent:e} long and reaches {farthest:e} from the origin"),
-    )
-    .help(format!("choose units in which lengths lie between {SMALLEST:e} and {LARGEST:e}: their powers are no numbers otherwise")))
+    Err(SceneError::mesh(format!("`mesh` is {extent:e} long and reaches {farthest:e} from the origin"))
+        .help(format!("choose units in which lengths lie between {SMALLEST:e} and {LARGEST:e}: their powers are no numbers otherwise")))
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -195,10 +185,9 @@ fn generate<const D: usize>(
         lines.push(line);
         total *= count;
         if total > MOST_CELLS {
-            return Err(SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!("`{place}` would have more than {total:.1e} cells"),
-            )
+            return Err(SceneError::wrong_value(format!(
+                "`{place}` would have more than {total:.1e} cells"
+            ))
             .label(spec.span(), "too fine")
             .help(format!(
                 "ask for fewer cells; the limit is {MOST_CELLS:.0e}"
@@ -206,11 +195,10 @@ fn generate<const D: usize>(
         }
     }
     let Ok(lines) = <[Axis; D]>::try_from(lines) else {
-        return Err(SceneError::new(
-            SceneErrorKind::Dimension,
-            format!("`{place}` does not divide every axis"),
-        )
-        .help("give x, y and z as far as the dimension goes"));
+        return Err(
+            SceneError::dimension(format!("`{place}` does not divide every axis"))
+                .help("give x, y and z as far as the dimension goes"),
+        );
     };
     let mut grid = Grid::new(lines);
     if cells == Simplices {
@@ -219,10 +207,9 @@ fn generate<const D: usize>(
     for (name, cutout) in cutouts {
         let at = format!("{place}.cutouts.{name}");
         if SIDES[..2 * D].contains(&name.value.as_str()) {
-            return Err(SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!("`{at}` has the name of a side of the mesh, whose set it would join"),
-            )
+            return Err(SceneError::wrong_value(format!(
+                "`{at}` has the name of a side of the mesh, whose set it would join"
+            ))
             .label(name.span.clone(), "a side")
             .help("give the cutout another name, such as `hole`"));
         }
@@ -245,7 +232,7 @@ fn generate<const D: usize>(
                 .map(|(key, _)| key.span.clone()),
             _ => None,
         };
-        SceneError::new(SceneErrorKind::Mesh, format!("`{place}`: {error}"))
+        SceneError::mesh(format!("`{place}`: {error}"))
             .label(span.unwrap_or(min.span.clone()), "here")
     })
 }
@@ -259,12 +246,11 @@ fn axis(
 ) -> Result<(Axis, f64), SceneError> {
     let length = max - min;
     match spec.get_ref() {
-        AxisSpec::Cells(count) if count.value == 0 => Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`{place}.cells` is 0"),
-        )
-        .label(count.span.clone(), "no cells")
-        .help("ask for at least 1 cell")),
+        AxisSpec::Cells(count) if count.value == 0 => {
+            Err(SceneError::wrong_value(format!("`{place}.cells` is 0"))
+                .label(count.span.clone(), "no cells")
+                .help("ask for at least 1 cell"))
+        }
         AxisSpec::Cells(count) => Ok((
             Axis::Uniform {
                 min,

@@ -9,11 +9,11 @@
 //! | `spec/` | what is typed; the JSON Schema comes from here |
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `draft.rs`, `validated.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
-//! | `meshing.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `materials.rs`, `material_interfaces.rs`, `peridynamics.rs`, `default_points.rs`, `default_horizon.rs`, `points.rs`, `cracks_and_voids.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs`, `section.rs` | its parts |
+//! | `meshing.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `materials.rs`, `material_interfaces.rs`, `peridynamics.rs`, `default_points.rs`, `default_horizon.rs`, `cracks_and_voids.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs`, `section.rs` | its parts |
 //! | `coupling_selection.rs`, `selected_coupling.rs` | the coupling that is typed, or the one that suits the scene |
 //! | `coupling_kinds/` | the couplings that are typed, one file each |
 //! | `condition_kinds/` | the conditions that are typed, one file each: loads, supports, springs |
-//! | `conditions.rs`, `load.rs`, `condition_list.rs` | a condition; a load, where it acts and its density; all conditions together |
+//! | `conditions.rs`, `load.rs`, `condition_at.rs`, `condition_list.rs` | a condition; a load, where it acts and its density; where a condition is read; all conditions together |
 //! | `components.rs`, `places.rs` | vector fields, and the sets and shapes that conditions name |
 //! | `temperature.rs` | the temperature of the body |
 //! | `impactors.rs` | rigid bodies that strike or press |
@@ -31,6 +31,7 @@ pub(crate) mod agreement;
 pub(crate) mod bounds_checks;
 pub mod build;
 pub(crate) mod components;
+mod condition_at;
 pub mod condition_kinds;
 mod condition_list;
 pub(crate) mod conditions;
@@ -56,7 +57,6 @@ pub(crate) mod output;
 pub(crate) mod parse;
 pub(crate) mod peridynamics;
 pub(crate) mod places;
-pub(crate) mod points;
 pub(crate) mod region;
 pub(crate) mod rim;
 pub(crate) mod section;
@@ -76,12 +76,11 @@ pub(crate) mod value;
 pub(crate) mod zones;
 
 pub use crate::peridynamics::failure::Fracture;
-pub use crate::scene::points::Points;
 pub use adaptive_zone::Follow;
 pub use conditions::{Components, Condition, Field, Prescribed, Support};
 pub use error::{SceneError, SceneErrorKind};
 pub use expression::{Expression, ExpressionError};
-pub use failure::{Breaking, Contact};
+pub use failure::Breaking;
 pub use function::Function;
 pub use impactors::{Impactor, ImpactorMotion};
 pub use initial::{Initial, InitialKind};

@@ -3,7 +3,7 @@
 use toml::Spanned;
 
 use super::bounds_checks;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::places::extent;
 use super::region::{self, Region};
 use super::section;
@@ -47,12 +47,9 @@ pub(crate) fn output<const D: usize>(
         let to = region::position::<D>(&format!("{place}.to"), &line.to)?;
         let n = line.samples.value;
         if !(2..=1_000_000).contains(&n) {
-            return Err(SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!("`{place}.samples` is {n}"),
-            )
-            .label(line.samples.span.clone(), "2 to 1000000")
-            .help("a line needs at least its two ends"));
+            return Err(SceneError::wrong_value(format!("`{place}.samples` is {n}"))
+                .label(line.samples.span.clone(), "2 to 1000000")
+                .help("a line needs at least its two ends"));
         }
         let positions = (0..n)
             .map(|i| from.lerp(&to, i as f64 / (n - 1) as f64))
@@ -67,18 +64,18 @@ pub(crate) fn output<const D: usize>(
         let place = format!("output.probes.{key}.at");
         let at = region::position::<D>(&place, &probe.at)?;
         if locator.locate(mesh, &at, tolerance).is_none() {
-            return Err(SceneError::new(
-                SceneErrorKind::Empty,
-                format!("`{place}` = {:?} lies outside the mesh", at.as_slice()),
-            )
+            return Err(SceneError::empty(format!(
+                "`{place}` = {:?} lies outside the mesh",
+                at.as_slice()
+            ))
             .label(probe.at.span.clone(), "outside")
             .help(extent(mesh)));
         }
         if voids.iter().any(|v| v.signed_distance(&at) < -tolerance) {
-            return Err(SceneError::new(
-                SceneErrorKind::Empty,
-                format!("`{place}` = {:?} lies in a void", at.as_slice()),
-            )
+            return Err(SceneError::empty(format!(
+                "`{place}` = {:?} lies in a void",
+                at.as_slice()
+            ))
             .label(probe.at.span.clone(), "nothing moves there")
             .help("move it out of all [voids]"));
         }
@@ -198,10 +195,9 @@ fn has_own_table(place: &str, key: &Text, o: &OutputSpec, moves: bool) -> Result
     }
     match taken.iter().find(|(name, _)| key.value == *name) {
         None => Ok(()),
-        Some((_, table)) => Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("the line `{place}` has the name of {table}"),
-        )
+        Some((_, table)) => Err(SceneError::wrong_value(format!(
+            "the line `{place}` has the name of {table}"
+        ))
         .label(key.span.clone(), "both would be one file")
         .help("give the line another name")),
     }
@@ -213,10 +209,10 @@ fn part_of_a_file_name(place: &str, name: &Text) -> Result<(), SceneError> {
     if !name.value.is_empty() && !name.value.contains(stray) {
         return Ok(());
     }
-    Err(SceneError::new(
-        SceneErrorKind::WrongValue,
-        format!("`{place}`: {:?} is no part of a file name", name.value),
-    )
+    Err(SceneError::wrong_value(format!(
+        "`{place}`: {:?} is no part of a file name",
+        name.value
+    ))
     .label(name.span.clone(), "names files")
     .help("use letters, digits, `-`, `_`, `.`; folders belong into output.directory"))
 }
@@ -226,12 +222,11 @@ fn tip<const D: usize>(key: &Text, spec: &TipSpec, mesh: &Mesh<D>) -> Result<Tip
     part_of_a_file_name(&place, key)?;
     let direction = region::position::<D>(&format!("{place}.direction"), &spec.direction)?;
     if direction.norm() <= 0.0 {
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`{place}.direction` is zero"),
-        )
-        .label(spec.direction.span.clone(), "points nowhere")
-        .help("give the direction in which the crack runs"));
+        return Err(
+            SceneError::wrong_value(format!("`{place}.direction` is zero"))
+                .label(spec.direction.span.clone(), "points nowhere")
+                .help("give the direction in which the crack runs"),
+        );
     }
     let threshold = match &spec.threshold {
         Some(t) => bounds_checks::within(

@@ -91,7 +91,7 @@ fn translate(error: &toml::de::Error, places: &DeTable<'_>) -> SceneError {
         let key = names.first().copied().unwrap_or_default();
         let at = place.dotted();
         let (message, help) = missing(key, &at);
-        let error = SceneError::new(SceneErrorKind::Missing, message).help(help);
+        let error = SceneError::missing(message).help(help);
         // the span of a whole file says nothing; that of a table is its header
         return if at.is_empty() {
             error.label(0..0, "not found in this scene")
@@ -105,14 +105,11 @@ fn translate(error: &toml::de::Error, places: &DeTable<'_>) -> SceneError {
         format!("`{}`", place.dotted())
     };
     if let Some(rest) = message.strip_prefix("in the expression ") {
-        return SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("{at}: in the expression {rest}"),
-        )
-        .label(span, "this expression")
-        .help(
-            "expressions know + - * / ^, comparisons, brackets and functions such as sin(pi * x)",
-        );
+        return SceneError::wrong_value(format!("{at}: in the expression {rest}"))
+            .label(span, "this expression")
+            .help(
+                "expressions know + - * / ^, comparisons, brackets and functions such as sin(pi * x)",
+            );
     }
     if let Some(rest) = message.strip_prefix("invalid type: ") {
         let (found, expected) = rest
@@ -133,11 +130,11 @@ fn translate(error: &toml::de::Error, places: &DeTable<'_>) -> SceneError {
         )
         .label(span, "a table of one key belongs here")
         .help(match tagged_table::options(&path) {
-            Some(options) => format!("write {{ key = ... }} with one of {}", quoted(options)),
+            Some(options) => format!("write {{ key = ... }} with one of {}", quoted(&options)),
             None => "see `bondline schema` for the choices".to_owned(),
         });
     }
-    SceneError::new(SceneErrorKind::WrongValue, format!("{at}: {message}"))
+    SceneError::wrong_value(format!("{at}: {message}"))
         .label(span, "this value")
         .help("see `bondline schema` for what belongs here")
 }

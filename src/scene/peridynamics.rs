@@ -1,21 +1,19 @@
 //! The peridynamic choices of a validated scene: horizon, points, weights, influence function, partial volumes.
 
+use toml::Spanned;
+
 use super::bounds_checks;
 use super::default_horizon::horizon_of;
 use super::default_points::default_points;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::expression::Expression;
-use super::points::Points;
 use super::region::position;
 use super::solve;
-use super::spec::{
-    InfluenceSpec, LatticeStart, PeridynamicsSpec, PointsSpec, SurfacesSpec, VolumesSpec,
-    WeightsSpec,
-};
+use super::spec::{InfluenceSpec, LatticeStart, PeridynamicsSpec, PointsSpec};
 use super::value::Number;
 use crate::mesh::Mesh;
-use crate::model::Zone;
-use crate::peridynamics::{Influence, PartialVolume};
+use crate::model::{PointSource, Surfaces, Zone};
+use crate::peridynamics::{BondWeights, Influence, PartialVolume};
 use crate::tensor::{Vector, padded};
 
 /// The peridynamic choices of a scene.
@@ -26,15 +24,15 @@ pub struct Peridynamics<const D: usize> {
     /// Reason for its size, if the scene does not type it.
     pub horizon_why: Option<String>,
     /// Positions of the points.
-    pub points: Points<D>,
+    pub points: PointSource<D>,
     /// Reason for their positions, as far as the scene does not type them.
     pub points_why: Option<String>,
     /// Bond weights.
-    pub weights: WeightsSpec,
+    pub weights: BondWeights,
     /// Shares of the cells that the horizon cuts.
     pub volumes: PartialVolume,
     /// Treatment of bonds across the boundary of the mesh.
-    pub surfaces: SurfacesSpec,
+    pub surfaces: Surfaces,
 }
 
 impl<const D: usize> Peridynamics<D> {
@@ -57,7 +55,7 @@ pub(crate) fn influence(place: &str, spec: &InfluenceSpec) -> Result<Influence, 
         } else {
             &p.alpha.span
         };
-        SceneError::new(SceneErrorKind::WrongValue, format!("`{place}`: {error}"))
+        SceneError::wrong_value(format!("`{place}`: {error}"))
             .label(span.clone(), "not offered")
             .help("degree is 0, 1, 3, 5 or 7; alpha is 0 or 1")
     })
@@ -82,19 +80,16 @@ pub(crate) fn peridynamics<const D: usize>(
             points_why = Some(why);
             points
         }
-        Some(PointsSpec::Cells) => Points::Cells,
+        Some(PointsSpec::Cells) => PointSource::Cells,
         Some(PointsSpec::Lattice(lattice)) => {
             let spacing =
                 bounds_checks::positive("peridynamics.points.lattice.spacing", &lattice.spacing)?;
             let (lo, hi) = mesh.bounds();
             let count: f64 = (hi - lo).iter().map(|l| l / spacing).product();
             if count > 1e9 {
-                return Err(SceneError::new(
-                    SceneErrorKind::WrongValue,
-                    format!(
-                        "`peridynamics.points.lattice.spacing` is {spacing}: {count:.1e} points would fill the mesh"
-                    ),
-                )
+                return Err(SceneError::wrong_value(format!(
+                    "`peridynamics.points.lattice.spacing` is {spacing}: {count:.1e} points would fill the mesh"
+                ))
                 .label(lattice.spacing.span.clone(), "too fine")
                 .help("use a larger spacing"));
             }
@@ -114,7 +109,7 @@ pub(crate) fn peridynamics<const D: usize>(
                     origin
                 }
             };
-            Points::Lattice { spacing, origin }
+            PointSource::Lattice { spacing, origin }
         }
     };
     Ok(Peridynamics {
@@ -144,17 +139,12 @@ fn check_horizon<const D: usize>(typed: &Expression) -> Result<(), SceneError> {
 
 /// The partial volumes typed; they need to know the cells of a lattice.
 fn volumes(spec: &PeridynamicsSpec) -> Result<PartialVolume, SceneError> {
-    let Some(typed) = &spec.volumes else {
+    let is_partial = |typed: &&Spanned<PartialVolume>| *typed.get_ref() != PartialVolume::Full;
+    let Some(typed) = spec.volumes.as_ref().filter(is_partial) else {
         return Ok(PartialVolume::Full);
     };
-    let volumes = match typed.get_ref() {
-        VolumesSpec::Full => return Ok(PartialVolume::Full),
-        VolumesSpec::Pdlammps => PartialVolume::PdLammps,
-        VolumesSpec::Hhb => PartialVolume::Hhb,
-        VolumesSpec::Exact => PartialVolume::Exact,
-    };
     let conflict = |message: &str, help: &str| {
-        Err(SceneError::new(SceneErrorKind::Conflict, message)
+        Err(SceneError::conflict(message)
             .label(typed.span(), "needs a lattice of points")
             .help(help))
     };
@@ -164,13 +154,13 @@ fn volumes(spec: &PeridynamicsSpec) -> Result<PartialVolume, SceneError> {
             "give peridynamics.points.lattice a spacing, or use volumes = \"full\"",
         );
     }
-    if spec.weights == WeightsSpec::Fitted {
+    if spec.weights == BondWeights::Fitted {
         return conflict(
             "`peridynamics.volumes` is partial, and the weights are fitted to full volumes",
             "use weights = \"isotropic\" or \"plain\", or volumes = \"full\"",
         );
     }
-    Ok(volumes)
+    Ok(*typed.get_ref())
 }
 
 #[cfg(test)]

@@ -2,7 +2,8 @@
 
 use rustc_hash::FxHashSet;
 
-use super::error::{SceneError, SceneErrorKind};
+use super::condition_at::ConditionAt;
+use super::error::SceneError;
 use super::region::{Region, region, unknown_set};
 use super::spec::ShapeSpec;
 use super::value::Text;
@@ -26,43 +27,6 @@ pub enum Support<const D: usize> {
     Inside(Region<D>),
 }
 
-/// Place of a condition: a set of the mesh, or a shape.
-pub(super) fn support<const D: usize>(
-    place: &str,
-    name: &Text,
-    on: Option<&Text>,
-    inside: Option<&ShapeSpec>,
-    mesh: &Mesh<D>,
-) -> Result<Support<D>, SceneError> {
-    Ok(match (on, inside) {
-        (Some(set), None) => {
-            let at = format!("{place}.on");
-            let known = mesh.set_names();
-            let Some(nodes) = mesh.nodes_of_set(&set.value) else {
-                return Err(unknown_set(&at, set, "set", &known, mesh));
-            };
-            not_empty(&at, set, nodes.len())?;
-            Support::Set {
-                name: set.value.clone(),
-                nodes,
-                facets: mesh.facet_sets.get(&set.value).cloned().unwrap_or_default(),
-            }
-        }
-        (None, Some(shape)) => Support::Inside(self::inside(place, name, shape, mesh)?),
-        (both, _) => {
-            let (what, label) = match both {
-                Some(_) => ("both `on` and `inside`", "two places"),
-                None => ("neither `on` nor `inside`", "where?"),
-            };
-            return Err(
-                SceneError::new(SceneErrorKind::Choice, format!("`{place}` has {what}"))
-                    .label(name.span.clone(), label)
-                    .help("keep one: `on = \"set\"` of the mesh, or `inside = { box = ... }`"),
-            );
-        }
-    })
-}
-
 /// A shape that holds a part of the mesh.
 pub(crate) fn inside<const D: usize>(
     place: &str,
@@ -71,12 +35,11 @@ pub(crate) fn inside<const D: usize>(
     mesh: &Mesh<D>,
 ) -> Result<Region<D>, SceneError> {
     if let ShapeSpec::Set(set) = shape {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`{place}.inside` is the set `{set}`"),
-        )
-        .label(set.span.clone(), "no shape")
-        .help("name a set by `on`, or give a shape such as `box`"));
+        return Err(
+            SceneError::conflict(format!("`{place}.inside` is the set `{set}`"))
+                .label(set.span.clone(), "no shape")
+                .help("name a set by `on`, or give a shape such as `box`"),
+        );
     }
     let found = region(&format!("{place}.inside"), shape, mesh)?;
     let tolerance = 1e-9 * (mesh.bounds().1 - mesh.bounds().0).norm();
@@ -85,12 +48,11 @@ pub(crate) fn inside<const D: usize>(
     if holds_something {
         return Ok(found);
     }
-    Err(SceneError::new(
-        SceneErrorKind::Empty,
-        format!("`{place}.inside` holds no part of the mesh"),
+    Err(
+        SceneError::empty(format!("`{place}.inside` holds no part of the mesh"))
+            .label(name.span.clone(), "acts nowhere")
+            .help(extent(mesh)),
     )
-    .label(name.span.clone(), "acts nowhere")
-    .help(extent(mesh)))
 }
 
 /// The extent of a mesh, as a remedy for what misses it.
@@ -103,74 +65,102 @@ pub(crate) fn extent<const D: usize>(mesh: &Mesh<D>) -> String {
     )
 }
 
-/// The facets of a named set, of which there are some.
-pub(super) fn facet_set<'m, const D: usize>(
-    place: &str,
-    on: &Text,
-    mesh: &'m Mesh<D>,
-) -> Result<&'m [Facet], SceneError> {
-    let place = format!("{place}.on");
-    let Some(facets) = mesh.facet_sets.get(&on.value) else {
-        let known: Vec<&str> = mesh.facet_sets.keys().map(String::as_str).collect();
-        let wanted = ["set of end points", "set of edges", "set of faces"][D - 1];
-        return Err(unknown_set(&place, on, wanted, &known, mesh));
-    };
-    not_empty(&place, on, facets.len())?;
-    Ok(facets)
-}
+impl<'a, const D: usize> ConditionAt<'a, D> {
+    /// The place of a condition: a set of the mesh, or a shape.
+    pub fn support(
+        &self,
+        on: Option<&Text>,
+        inside: Option<&ShapeSpec>,
+    ) -> Result<Support<D>, SceneError> {
+        let (place, mesh) = (self.place, self.mesh);
+        Ok(match (on, inside) {
+            (Some(set), None) => {
+                let at = format!("{place}.on");
+                let known = mesh.set_names();
+                let Some(nodes) = mesh.nodes_of_set(&set.value) else {
+                    return Err(unknown_set(&at, set, "set", &known, mesh));
+                };
+                not_empty(&at, set, nodes.len())?;
+                Support::Set {
+                    name: set.value.clone(),
+                    nodes,
+                    facets: mesh.facet_sets.get(&set.value).cloned().unwrap_or_default(),
+                }
+            }
+            (None, Some(shape)) => Support::Inside(self.inside(shape)?),
+            (both, _) => {
+                let (what, label) = match both {
+                    Some(_) => ("both `on` and `inside`", "two places"),
+                    None => ("neither `on` nor `inside`", "where?"),
+                };
+                return Err(SceneError::choice(format!("`{place}` has {what}"))
+                    .label(self.name.span.clone(), label)
+                    .help("keep one: `on = \"set\"` of the mesh, or `inside = { box = ... }`"));
+            }
+        })
+    }
 
-/// The facets of a named set, normals outwards; all of them bound the mesh.
-pub(super) fn outer_facets<const D: usize>(
-    place: &str,
-    on: &Text,
-    mesh: &Mesh<D>,
-) -> Result<Vec<BoundaryFacet>, SceneError> {
-    let facets = facet_set(place, on, mesh)?;
-    let sorted = |nodes: &[u32]| {
-        let mut nodes = nodes.to_vec();
-        nodes.sort_unstable();
-        nodes
-    };
-    let outer = mesh.outer_facets();
-    let outer: FxHashSet<Vec<u32>> = outer.iter().map(|f| sorted(&f.nodes)).collect();
-    if let Some(inner) = facets.iter().find(|f| !outer.contains(&sorted(f))) {
-        let nodes = inner.iter().map(|&n| mesh.nodes[n as usize]);
-        let middle = nodes.sum::<Vector<D>>() / inner.len() as f64;
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!(
+    /// A shape that holds a part of the mesh.
+    pub fn inside(&self, shape: &ShapeSpec) -> Result<Region<D>, SceneError> {
+        inside(self.place, self.name, shape, self.mesh)
+    }
+
+    /// The facets of a named set, of which there are some.
+    pub fn facet_set(&self, on: &Text) -> Result<&'a [Facet], SceneError> {
+        let place = format!("{}.on", self.place);
+        let sets = &self.mesh.facet_sets;
+        let Some(facets) = sets.get(&on.value) else {
+            let known: Vec<&str> = sets.keys().map(String::as_str).collect();
+            let wanted = ["set of end points", "set of edges", "set of faces"][D - 1];
+            return Err(unknown_set(&place, on, wanted, &known, self.mesh));
+        };
+        not_empty(&place, on, facets.len())?;
+        Ok(facets)
+    }
+
+    /// The facets of a named set, normals outwards; all of them bound the mesh.
+    pub fn outer_facets(&self, on: &Text) -> Result<Vec<BoundaryFacet>, SceneError> {
+        let (place, mesh) = (self.place, self.mesh);
+        let facets = self.facet_set(on)?;
+        let sorted = |nodes: &[u32]| {
+            let mut nodes = nodes.to_vec();
+            nodes.sort_unstable();
+            nodes
+        };
+        let outer = mesh.outer_facets();
+        let outer: FxHashSet<Vec<u32>> = outer.iter().map(|f| sorted(&f.nodes)).collect();
+        if let Some(inner) = facets.iter().find(|f| !outer.contains(&sorted(f))) {
+            let nodes = inner.iter().map(|&n| mesh.nodes[n as usize]);
+            let middle = nodes.sum::<Vector<D>>() / inner.len() as f64;
+            return Err(SceneError::conflict(format!(
                 "`{place}.on`: the facet of the set `{on}` at {:?} is not at the boundary of the mesh",
                 middle.as_slice()
-            ),
-        )
-        .label(on.span.clone(), "has no outside there")
-        .help("name a set of facets that each belong to one cell; inside of the body prescribe a traction"));
+            ))
+            .label(on.span.clone(), "has no outside there")
+            .help("name a set of facets that each belong to one cell; inside of the body prescribe a traction"));
+        }
+        self.faces(on)
     }
-    faces(place, on, mesh)
-}
 
-/// The facets of a named set, each a face of a cell, its normal pointing out of that.
-pub(super) fn faces<const D: usize>(
-    place: &str,
-    on: &Text,
-    mesh: &Mesh<D>,
-) -> Result<Vec<BoundaryFacet>, SceneError> {
-    let facets = facet_set(place, on, mesh)?;
-    mesh.locate_facets(facets).map_err(|error| {
-        SceneError::new(SceneErrorKind::Conflict, format!("`{place}.on`: {error}"))
-            .label(on.span.clone(), "not a face of a cell")
-            .help("let the set hold faces of the cells of this mesh only")
-    })
+    /// The facets of a named set, each a face of a cell, its normal pointing out of that.
+    pub fn faces(&self, on: &Text) -> Result<Vec<BoundaryFacet>, SceneError> {
+        let facets = self.facet_set(on)?;
+        self.mesh.locate_facets(facets).map_err(|error| {
+            let message = format!("`{}.on`: {error}", self.place);
+            SceneError::conflict(message)
+                .label(on.span.clone(), "not a face of a cell")
+                .help("let the set hold faces of the cells of this mesh only")
+        })
+    }
 }
 
 fn not_empty(place: &str, set: &Text, count: usize) -> Result<(), SceneError> {
     if count > 0 {
         return Ok(());
     }
-    Err(SceneError::new(
-        SceneErrorKind::Empty,
-        format!("`{place}`: the set `{set}` of the mesh is empty"),
+    Err(
+        SceneError::empty(format!("`{place}`: the set `{set}` of the mesh is empty"))
+            .label(set.span.clone(), "empty")
+            .help("put facets or nodes into it, or name another set"),
     )
-    .label(set.span.clone(), "empty")
-    .help("put facets or nodes into it, or name another set"))
 }

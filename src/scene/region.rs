@@ -148,14 +148,11 @@ pub(crate) fn position<const D: usize>(
         return Ok(Vector::from_column_slice(&typed.values));
     }
     let example = ["0.1", "[0.1, 0.2]", "[0.1, 0.2, 0.3]"][D - 1];
-    Err(SceneError::new(
-        SceneErrorKind::Dimension,
-        format!(
-            "`{place}` has {} coordinate{} in a scene of dimension {D}",
-            typed.values.len(),
-            if typed.values.len() == 1 { "" } else { "s" }
-        ),
-    )
+    Err(SceneError::dimension(format!(
+        "`{place}` has {} coordinate{} in a scene of dimension {D}",
+        typed.values.len(),
+        if typed.values.len() == 1 { "" } else { "s" }
+    ))
     .label(typed.span.clone(), format!("{D} expected"))
     .help(format!(
         "write {D} coordinates such as {example}, or change `kinematics`"
@@ -174,15 +171,12 @@ pub(crate) fn corners<const D: usize>(
     );
     match (0..D).find(|&k| lo[k] >= hi[k]) {
         None => Ok((lo, hi)),
-        Some(k) => Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!(
-                "`{place}` runs from {} to {} along {}",
-                lo[k],
-                hi[k],
-                ["x", "y", "z"][k]
-            ),
-        )
+        Some(k) => Err(SceneError::wrong_value(format!(
+            "`{place}` runs from {} to {} along {}",
+            lo[k],
+            hi[k],
+            ["x", "y", "z"][k]
+        ))
         .label(max.span.clone(), "not larger than min")
         .label(min.span.clone(), "min")
         .help("make every coordinate of max larger than that of min")),
@@ -201,11 +195,8 @@ fn path<const D: usize>(
     if found.len() >= least {
         return Ok(found);
     }
-    let error = SceneError::new(
-        SceneErrorKind::WrongValue,
-        format!("`{place}` has {} points", found.len()),
-    )
-    .help(format!("give at least {least} points, [[x, y], ...]"));
+    let error = SceneError::wrong_value(format!("`{place}` has {} points", found.len()))
+        .help(format!("give at least {least} points, [[x, y], ...]"));
     Err(match points.first() {
         Some(p) => error.label(p.span.clone(), "too few"),
         None => error,
@@ -216,12 +207,9 @@ fn segment<const D: usize>(place: &str, s: &SegmentSpec) -> Result<Shape<D>, Sce
     let a = position(&format!("{place}.from"), &s.from)?;
     let b = position(&format!("{place}.to"), &s.to)?;
     if a == b {
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`{place}` has no length"),
-        )
-        .label(s.to.span.clone(), "the same as `from`")
-        .help("move one of its ends, or use `point`"));
+        return Err(SceneError::wrong_value(format!("`{place}` has no length"))
+            .label(s.to.span.clone(), "the same as `from`")
+            .help("move one of its ends, or use `point`"));
     }
     Ok(Shape::Segment { a, b })
 }
@@ -258,13 +246,10 @@ fn near<const D: usize>(place: &str, n: &NearSpec) -> Result<Region<D>, SceneErr
             shape,
             margin: within,
         }),
-        _ => Err(SceneError::new(
-            SceneErrorKind::Choice,
-            match names.as_slice() {
-                [] => format!("`{place}` names no shape"),
-                _ => format!("`{place}` names {} at once", quoted(&names)),
-            },
-        )
+        _ => Err(SceneError::choice(match names.as_slice() {
+            [] => format!("`{place}` names no shape"),
+            _ => format!("`{place}` names {} at once", quoted(&names)),
+        })
         .label(n.within.span.clone(), "within what?")
         .help(
             "beside `within`, give exactly one of `point`, `segment`, `polyline`, `polygon`, `box`",
@@ -319,12 +304,13 @@ pub(crate) fn shape<const D: usize>(
 ) -> Result<Shape<D>, SceneError> {
     match region(place, spec, mesh)? {
         Region::Shape { shape, margin: 0.0 } => Ok(shape),
-        _ => Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`{place}` must be one plain shape"),
-        )
-        .label(span.clone(), "no plain shape")
-        .help("use `box`, `ball` or `polygon`; a set of cells is left out of the mesh itself")),
+        _ => Err(
+            SceneError::conflict(format!("`{place}` must be one plain shape"))
+                .label(span.clone(), "no plain shape")
+                .help(
+                    "use `box`, `ball` or `polygon`; a set of cells is left out of the mesh itself",
+                ),
+        ),
     }
 }
 

@@ -10,7 +10,7 @@ use self::held_places::HeldPlaces;
 
 use super::coupling_selection::follows;
 use super::draft::Draft;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::region::{self, Region};
 use super::section::UncutBody;
 use super::source::Span;
@@ -23,10 +23,9 @@ use super::validated::Scene;
 use super::zones::Placed;
 use crate::fem::Locator;
 use crate::model::patch::{self, PatchError, PatchLattice, Patched, Places, Replaced};
-use crate::model::{Reach, Zone};
+use crate::model::{PointSource, Reach, Zone};
 use crate::observe::report::number;
 use crate::observe::summary::Decision;
-use crate::scene::points::Points;
 use crate::scene::solve::Solve;
 use crate::tensor::Vector;
 
@@ -77,7 +76,7 @@ fn before_others<const D: usize>(
         &draft.spec.zones,
         scene.peridynamics.as_ref().map(|p| &p.points),
     );
-    let (Some(zone), None, Some(Points::Lattice { spacing, origin })) =
+    let (Some(zone), None, Some(PointSource::Lattice { spacing, origin })) =
         (&zones.nonlocal, &zones.rim, lattice)
     else {
         return scene;
@@ -141,12 +140,12 @@ fn with_rim<const D: usize>(
     let touched = placed.is_none().then(|| met(draft)).flatten();
     let (before, _) = draft.with_coupling(placed.or(touched.as_ref()), instead)?;
     let conflict = |what: String, help: &str| {
-        SceneError::new(SceneErrorKind::Conflict, what)
+        SceneError::conflict(what)
             .label(span.clone(), "a layer of elements on the lattice")
             .help(help.to_owned())
     };
     let lattice = before.peridynamics.as_ref().map(|p| &p.points);
-    let Some(&Points::Lattice { spacing, origin }) = lattice else {
+    let Some(&PointSource::Lattice { spacing, origin }) = lattice else {
         return Err(conflict(
             "a rim of its own lies on a lattice, and the points are none".to_owned(),
             "use peridynamics.points.lattice, or rim = \"mesh\"",
@@ -346,10 +345,9 @@ fn refuse_others(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
     ];
     match others.iter().find(|other| other.1) {
         None => Ok(()),
-        Some((key, _)) => Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("a rim of its own and `{key}` do not go together"),
-        )
+        Some((key, _)) => Err(SceneError::conflict(format!(
+            "a rim of its own and `{key}` do not go together"
+        ))
         .label(span.clone(), "a layer of elements on the lattice")
         .help(format!("leave out {key}, or use rim = \"mesh\""))),
     }

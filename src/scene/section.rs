@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::conditions::Condition;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::places::{extent, inside};
 use super::region::{Region, position};
 use super::spec::SectionSpec;
@@ -63,15 +63,14 @@ fn section<const D: usize>(
     let normal = position::<D>(&format!("{place}.normal"), &spec.normal)?;
     let normal = normal.try_normalize(1e-300);
     let Some(normal) = normal.filter(|n| n.iter().all(|n| n.is_finite())) else {
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`{place}.normal` has no direction"),
-        )
-        .label(spec.normal.span.clone(), "zero")
-        .help(format!(
-            "write a direction such as {}",
-            ["[1]", "[1, 0]", "[1, 0, 0]"][D - 1]
-        )));
+        return Err(
+            SceneError::wrong_value(format!("`{place}.normal` has no direction"))
+                .label(spec.normal.span.clone(), "zero")
+                .help(format!(
+                    "write a direction such as {}",
+                    ["[1]", "[1, 0]", "[1, 0, 0]"][D - 1]
+                )),
+        );
     };
     let (low, high) = mesh.bounds();
     let section = Section {
@@ -105,9 +104,7 @@ fn section<const D: usize>(
             "move its point into the body",
         ),
     };
-    Err(
-        SceneError::new(SceneErrorKind::Empty, format!("`{place}` {what}"))
-            .label(spec.point.span.clone(), "cuts nothing")
-            .help(format!("{remedy}; {}", extent(mesh))),
-    )
+    Err(SceneError::empty(format!("`{place}` {what}"))
+        .label(spec.point.span.clone(), "cuts nothing")
+        .help(format!("{remedy}; {}", extent(mesh))))
 }

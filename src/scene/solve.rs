@@ -3,7 +3,7 @@
 use toml::Spanned;
 
 use super::bounds_checks;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::expression::Expression;
 use super::spec::{
     BeyondLimitSpec, ExplicitSpec, GrowingModesSpec, LoadStepSpec, QuasiStaticSpec, SolveSpec,
@@ -108,12 +108,9 @@ impl Clock {
         if self.pacing != Pacing::Still || !expression.depends_on_time() {
             return Ok(());
         }
-        Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`{place}` depends on the time t in a static scene"),
-        )
-        .label(expression.span.clone(), "t means nothing here")
-        .help("add [solve.explicit] with duration = ..., or [solve.quasi-static] with steps = ...; or use x, y, z only"))
+        Err(SceneError::conflict(format!("`{place}` depends on the time t in a static scene"))
+            .label(expression.span.clone(), "t means nothing here")
+            .help("add [solve.explicit] with duration = ..., or [solve.quasi-static] with steps = ...; or use x, y, z only"))
     }
 }
 
@@ -148,12 +145,11 @@ pub(crate) fn still(place: &str, expression: &Expression) -> Result<(), SceneErr
     if !expression.depends_on_time() {
         return Ok(());
     }
-    Err(SceneError::new(
-        SceneErrorKind::Conflict,
-        format!("`{place}` depends on the time t"),
+    Err(
+        SceneError::conflict(format!("`{place}` depends on the time t"))
+            .label(expression.span.clone(), "does not change with time")
+            .help("use x, y, z only; t belongs into conditions"),
     )
-    .label(expression.span.clone(), "does not change with time")
-    .help("use x, y, z only; t belongs into conditions"))
 }
 
 /// Reads the analysis of a scene.
@@ -178,8 +174,7 @@ fn pace(every: Option<&Every>) -> Option<Pace> {
 fn output_interval(spec: &ExplicitSpec, duration: f64) -> Result<f64, SceneError> {
     let output_interval = match (&spec.outputs, &spec.output_interval) {
         (Some(count), Some(interval)) => {
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
+            return Err(SceneError::conflict(
                 "`solve.explicit` has both `outputs` and `output-interval`",
             )
             .label(count.span.clone(), "a number of files")
@@ -190,13 +185,10 @@ fn output_interval(spec: &ExplicitSpec, duration: f64) -> Result<f64, SceneError
         (None, given) => interval("output-interval", given, duration, duration / 20.0)?,
     };
     if duration / output_interval > MOST_FILES {
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!(
-                "`solve.explicit` asks for {:.1e} VTU files",
-                duration / output_interval
-            ),
-        )
+        return Err(SceneError::wrong_value(format!(
+            "`solve.explicit` asks for {:.1e} VTU files",
+            duration / output_interval
+        ))
         .label(spec.duration.span.clone(), "over this time")
         .help(format!(
             "the limit is {MOST_FILES:.0e}; the history has a row for each of many more instants"
@@ -230,15 +222,14 @@ fn explicit(spec: &ExplicitSpec, has_large_strains: bool) -> Result<Explicit, Sc
     let duration = bounds_checks::positive(&place("duration"), &spec.duration)?;
     let step = match spec.step.value {
         Some(value) if !(value > 0.0 && value <= duration) => {
-            return Err(SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!("`{}` is {value}", place("step")),
-            )
-            .label(
-                spec.step.span.clone(),
-                format!("must be positive and at most the duration {duration}"),
-            )
-            .help("use step = \"auto\" for a fraction of the stable step"));
+            return Err(
+                SceneError::wrong_value(format!("`{}` is {value}", place("step")))
+                    .label(
+                        spec.step.span.clone(),
+                        format!("must be positive and at most the duration {duration}"),
+                    )
+                    .help("use step = \"auto\" for a fraction of the stable step"),
+            );
         }
         step => step,
     };
@@ -299,15 +290,12 @@ fn sub_steps(count: Option<&Count>) -> Result<Option<u32>, SceneError> {
     match u32::try_from(count.value) {
         Ok(1) => Ok(None),
         Ok(n) if (2..=sub_cycling::MOST).contains(&n) => Ok(Some(n)),
-        _ => Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`solve.explicit.sub-steps` is {}", count.value),
-        )
-        .label(
-            count.span.clone(),
-            format!("must be from 1 to {}", sub_cycling::MOST),
-        )
-        .help("2 or 3 suit a seam or a few small cells; where larger ratios are needed, even out the mesh")),
+        _ => Err(SceneError::wrong_value(format!("`solve.explicit.sub-steps` is {}", count.value))
+            .label(
+                count.span.clone(),
+                format!("must be from 1 to {}", sub_cycling::MOST),
+            )
+            .help("2 or 3 suit a seam or a few small cells; where larger ratios are needed, even out the mesh")),
     }
 }
 
@@ -317,12 +305,11 @@ const MOST_FILES: f64 = 1e5;
 /// The times of load steps that are listed.
 fn listed(spec: &QuasiStaticSpec, times: &[f64]) -> Result<Vec<f64>, SceneError> {
     let refuse = |what: String, label: &str, help: &str| {
-        Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`solve.quasi-static.steps` {what}"),
+        Err(
+            SceneError::wrong_value(format!("`solve.quasi-static.steps` {what}"))
+                .label(spec.steps.span.clone(), label)
+                .help(help),
         )
-        .label(spec.steps.span.clone(), label)
-        .help(help))
     };
     let order = "list the times of the load steps, larger than 0 and increasing: [0.5, 0.8, 1]; the state at t = 0 comes before them";
     if times.is_empty() {
@@ -366,10 +353,9 @@ fn accuracy(spec: &QuasiStaticSpec) -> Result<Option<f64>, SceneError> {
             "0.01 finds the load at which bonds break to 1 %",
         )
         .map(Some),
-        Some(a) => Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`{place}` is set and the load steps are given"),
-        )
+        Some(a) => Err(SceneError::conflict(format!(
+            "`{place}` is set and the load steps are given"
+        ))
         .label(a.span.clone(), "of steps that are found on the way")
         .help("use steps = \"auto\", or leave accuracy out")),
     }
@@ -381,11 +367,9 @@ fn quasi_static(spec: &QuasiStaticSpec) -> Result<QuasiStatic, SceneError> {
         if number.value > 0 {
             return Ok(number.value);
         }
-        Err(
-            SceneError::new(SceneErrorKind::WrongValue, format!("`{}` is 0", place(key)))
-                .label(number.span.clone(), "nothing is computed")
-                .help("ask for at least 1"),
-        )
+        Err(SceneError::wrong_value(format!("`{}` is 0", place(key)))
+            .label(number.span.clone(), "nothing is computed")
+            .help("ask for at least 1"))
     };
     let (steps, times) = match &spec.steps.choice {
         StepTimes::Equal(number) => {

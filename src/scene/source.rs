@@ -9,7 +9,7 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{Excerpt, SceneError, SceneErrorKind};
+use super::error::{Excerpt, SceneError};
 use super::function::Function;
 use super::tagged_table;
 use crate::mesh::MeshParts;
@@ -129,7 +129,7 @@ impl Source {
     /// Appends an override `key=value`, as typed after `--set`. A value that is no TOML is taken as text.
     ///
     /// # Errors
-    /// [`SceneErrorKind::Syntax`] if there is no `=`.
+    /// [`SceneErrorKind::Syntax`](crate::scene::SceneErrorKind::Syntax) if there is no `=`.
     pub fn push_override(&mut self, text: &str) -> Result<(), SceneError> {
         let start = self.pieces.last().map_or(0, |p| p.start + p.text.len() + 1);
         let mut text = text.to_owned();
@@ -152,7 +152,7 @@ impl Source {
         self.pieces.push(piece);
         match equals {
             Some(_) => Ok(()),
-            None => Err(SceneError::new(SceneErrorKind::Syntax, message)
+            None => Err(SceneError::syntax(message)
                 .label(span, "no value")
                 .help("write --set key=value, for example --set coupling=splice")
                 .shown_in(self)),
@@ -192,7 +192,7 @@ impl Source {
     /// The tables of the scene with all overrides applied, every key and value with its span.
     ///
     /// # Errors
-    /// [`SceneErrorKind::Syntax`] where the text is no TOML, [`SceneErrorKind::Choice`] where a table that must hold exactly one
+    /// [`SceneErrorKind::Syntax`](crate::scene::SceneErrorKind::Syntax) where the text is no TOML, [`SceneErrorKind::Choice`](crate::scene::SceneErrorKind::Choice) where a table that must hold exactly one
     /// key holds none or several.
     pub(crate) fn merged(&self) -> Result<Spanned<DeTable<'_>>, SceneError> {
         let mut root = self.parse(&self.pieces[0])?;
@@ -215,7 +215,7 @@ impl Source {
     /// checkpoint is written.
     ///
     /// # Errors
-    /// [`SceneErrorKind::Syntax`] where the text is no TOML, [`SceneErrorKind::Choice`] where a table holds none or several of keys of which it must hold one.
+    /// [`SceneErrorKind::Syntax`](crate::scene::SceneErrorKind::Syntax) where the text is no TOML, [`SceneErrorKind::Choice`](crate::scene::SceneErrorKind::Choice) where a table holds none or several of keys of which it must hold one.
     pub(crate) fn fingerprint(&self) -> Result<Fingerprint, SceneError> {
         let mut print = Fingerprint::default();
         print.add(env!("CARGO_PKG_VERSION").as_bytes());
@@ -226,7 +226,7 @@ impl Source {
     /// The scene with all overrides applied, without places.
     ///
     /// # Errors
-    /// [`SceneErrorKind::Syntax`] where the text is no TOML, [`SceneErrorKind::Choice`] where a table holds none or several of keys of which it must hold one.
+    /// [`SceneErrorKind::Syntax`](crate::scene::SceneErrorKind::Syntax) where the text is no TOML, [`SceneErrorKind::Choice`](crate::scene::SceneErrorKind::Choice) where a table holds none or several of keys of which it must hold one.
     pub fn table(&self) -> Result<toml::Table, SceneError> {
         Ok(plain_table(self.merged()?.get_ref()))
     }
@@ -234,7 +234,7 @@ impl Source {
     /// The scene as one TOML text with all overrides applied; a mesh file and libraries of routines are looked for from `folder`, wherever the text will lie.
     ///
     /// # Errors
-    /// [`SceneErrorKind::Syntax`], [`SceneErrorKind::Choice`] where the scene is none.
+    /// [`SceneErrorKind::Syntax`](crate::scene::SceneErrorKind::Syntax), [`SceneErrorKind::Choice`](crate::scene::SceneErrorKind::Choice) where the scene is none.
     pub fn text(&self, folder: &std::path::Path) -> Result<String, SceneError> {
         let mut table = self.table()?;
         let path = table
@@ -261,13 +261,10 @@ impl Source {
             &piece.toml
         };
         DeTable::parse(text).map_err(|error| {
-            SceneError::new(
-                SceneErrorKind::Syntax,
-                format!("this is not TOML: {}", error.message()),
-            )
-            .label(error.span().unwrap_or(piece.start..piece.start), "here")
-            .help("a line reads `key = value` or `[table]`; text needs quotes")
-            .shown_in(self)
+            SceneError::syntax(format!("this is not TOML: {}", error.message()))
+                .label(error.span().unwrap_or(piece.start..piece.start), "here")
+                .help("a line reads `key = value` or `[table]`; text needs quotes")
+                .shown_in(self)
         })
     }
 }
@@ -275,12 +272,11 @@ impl Source {
 /// Writes `mesh.file.path = name` for a mesh in memory.
 fn stand_in(root: &mut DeTable<'_>, name: &str) -> Result<(), SceneError> {
     if let Some((key, _)) = root.get_key_value("mesh") {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            "the scene has a `mesh` of its own and one in memory",
-        )
-        .label(key.span(), "one too many")
-        .help("leave out one of the two"));
+        return Err(
+            SceneError::conflict("the scene has a `mesh` of its own and one in memory")
+                .label(key.span(), "one too many")
+                .help("leave out one of the two"),
+        );
     }
     let entry = |key: &'static str, value| {
         let key = Spanned::new(0..0, key.into());
@@ -448,11 +444,8 @@ pub fn read<'p>(
     overrides: &[String],
 ) -> Result<(Source, &'p Path, String), SceneError> {
     let text = regular_file::read_scene(path).map_err(|error| {
-        SceneError::new(
-            SceneErrorKind::File,
-            format!("cannot read the scene {}: {error}", path.display()),
-        )
-        .help("check the path; `bondline new scene.toml` writes a template")
+        SceneError::file(format!("cannot read the scene {}: {error}", path.display()))
+            .help("check the path; `bondline new scene.toml` writes a template")
     })?;
     let mut source = Source::new(path.display().to_string(), text);
     for text in overrides {

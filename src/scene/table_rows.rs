@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::expression;
 use super::spec::TableSpec;
 use super::table::Table;
@@ -39,12 +39,9 @@ pub(crate) fn take_in(
                     Some(_) => ("both `points` and `file`", "two sources"),
                     None => ("neither `points` nor `file`", "no rows"),
                 };
-                return Err(SceneError::new(
-                    SceneErrorKind::Choice,
-                    format!("`{place}` has {what}"),
-                )
-                .label(name.span.clone(), label)
-                .help("keep one: points = [[0, 0], [1, 5]], or file = \"curve.csv\""));
+                return Err(SceneError::choice(format!("`{place}` has {what}"))
+                    .label(name.span.clone(), label)
+                    .help("keep one: points = [[0, 0], [1, 5]], or file = \"curve.csv\""));
             }
         }
     }
@@ -54,12 +51,9 @@ pub(crate) fn take_in(
 /// Refuses a name that an expression reads as something else.
 fn check_name(name: &Text) -> Result<(), SceneError> {
     let wrong = |what: String| {
-        Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("the table `{name}` {what}"),
-        )
-        .label(name.span.clone(), "not a name in an expression")
-        .help("use a letter, then letters, digits and `_`, such as load_curve, and no name that expressions know"))
+        Err(SceneError::wrong_value(format!("the table `{name}` {what}"))
+            .label(name.span.clone(), "not a name in an expression")
+            .help("use a letter, then letters, digits and `_`, such as load_curve, and no name that expressions know"))
     };
     let mut letters = name.value.chars();
     let is_word = letters.next().is_some_and(char::is_alphabetic)
@@ -83,12 +77,9 @@ fn typed_rows(
     let mut rows: Vec<(f64, f64)> = Vec::with_capacity(points.len());
     for (k, point) in points.iter().enumerate() {
         let refuse = |what: String, label: &str| {
-            SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!("`{place}`, row {}: {what}", k + 1),
-            )
-            .label(point.span.clone(), label)
-            .help(ROWS)
+            SceneError::wrong_value(format!("`{place}`, row {}: {what}", k + 1))
+                .label(point.span.clone(), label)
+                .help(ROWS)
         };
         let [s, value] = point.values[..] else {
             let count = point.values.len();
@@ -103,12 +94,11 @@ fn typed_rows(
         rows.push((s, value));
     }
     if rows.len() < 2 {
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`{place}` has {} rows", rows.len()),
-        )
-        .label(name.span.clone(), "at least two are needed")
-        .help(ROWS));
+        return Err(
+            SceneError::wrong_value(format!("`{place}` has {} rows", rows.len()))
+                .label(name.span.clone(), "at least two are needed")
+                .help(ROWS),
+        );
     }
     Ok(rows)
 }
@@ -131,12 +121,9 @@ pub(crate) fn read_files(
         };
         let path = directory.join(&file.value);
         let refuse = |what: String, help: &str| {
-            SceneError::new(
-                SceneErrorKind::File,
-                format!("`tables.{name}.file`: {}{what}", path.display()),
-            )
-            .label(file.span.clone(), "this file")
-            .help(help)
+            SceneError::file(format!("`tables.{name}.file`: {}{what}", path.display()))
+                .label(file.span.clone(), "this file")
+                .help(help)
         };
         let text = regular_file::read_to_string(&path).map_err(|error| {
             refuse(

@@ -1,13 +1,12 @@
 //! The temperature of a body.
 
 use super::bounds_checks;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::expression::Expression;
 use super::materials::Material;
 use super::solve::{Clock, Solve};
-use super::spec::{
-    CouplingSpec, CutBondsSpec, ElementsSpec, MaterialSpec, SceneSpec, TemperatureSpec,
-};
+use super::spec::{CouplingSpec, ElementsSpec, MaterialSpec, SceneSpec, TemperatureSpec};
+use crate::coupling::truncated::CutBonds;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
 use crate::peridynamics::laws::Named;
@@ -38,10 +37,10 @@ pub(super) fn temperature<const D: usize>(
         for &t in clock.instants(spec.value.depends_on_time()) {
             let found = spec.value.eval_at(&padded(x), t);
             if !found.is_finite() {
-                return Err(SceneError::new(
-                    SceneErrorKind::WrongValue,
-                    format!("`{place}` is {found} at {:?}, t = {t}", x.as_slice()),
-                )
+                return Err(SceneError::wrong_value(format!(
+                    "`{place}` is {found} at {:?}, t = {t}",
+                    x.as_slice()
+                ))
                 .label(spec.value.span.clone(), "no finite number there")
                 .help("choose between branches with if(condition, a, b)"));
             }
@@ -65,7 +64,7 @@ pub(super) fn agrees<const D: usize>(
     };
     let span = temperature.value.span.clone();
     let refuse = |what: String, help: &str| {
-        let error = SceneError::new(SceneErrorKind::Conflict, what);
+        let error = SceneError::conflict(what);
         Err(error.label(span.clone(), "thermal strain").help(help))
     };
     if let Some(cold) = materials.iter().find(|m| m.expansion.is_none()) {
@@ -104,7 +103,7 @@ pub(super) fn agrees<const D: usize>(
         );
     }
     match coupling {
-        CouplingSpec::Truncated(typed) if typed.cut_bonds == Some(CutBondsSpec::Breaking) => refuse(
+        CouplingSpec::Truncated(typed) if typed.cut_bonds == Some(CutBonds::Breaking) => refuse(
             "`temperature`, and cut-bonds = \"breaking\": bonds that a seam cuts know no temperature but linear ones".to_owned(),
             "let cut-bonds = \"linear\" in [coupling.truncated], or leave it out, and keep damage two horizons away from the seam",
         ),
@@ -118,10 +117,9 @@ fn unheated(spec: &SceneSpec) -> Result<(), SceneError> {
     let Some((name, span)) = spec.materials.iter().find_map(|(n, m)| Some((n, of(m)?))) else {
         return Ok(());
     };
-    Err(SceneError::new(
-        SceneErrorKind::Missing,
-        format!("the material `{name}` has a thermal-expansion, and the scene no temperature"),
-    )
+    Err(SceneError::missing(format!(
+        "the material `{name}` has a thermal-expansion, and the scene no temperature"
+    ))
     .label(span, "expands by nothing")
     .help("add [temperature] with value = \"...\", or remove the key"))
 }

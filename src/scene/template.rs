@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 
 /// A scene to start from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -45,7 +45,7 @@ impl Template {
     /// Writes it to a new file.
     ///
     /// # Errors
-    /// [`SceneErrorKind::File`] if the file exists already or cannot be written.
+    /// [`SceneErrorKind::File`](crate::scene::SceneErrorKind::File) if the file exists already or cannot be written.
     pub fn write(self, path: &Path) -> Result<(), SceneError> {
         let failed = |error: std::io::Error| {
             let help = match error.kind() {
@@ -54,10 +54,10 @@ impl Template {
                 }
                 _ => "check that the folder exists and may be written to",
             };
-            SceneError::new(
-                SceneErrorKind::File,
-                format!("cannot write the template {}: {error}", path.display()),
-            )
+            SceneError::file(format!(
+                "cannot write the template {}: {error}",
+                path.display()
+            ))
             .help(help)
         };
         let mut file = std::fs::OpenOptions::new()

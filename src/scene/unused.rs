@@ -9,9 +9,8 @@ use super::region::Region;
 use super::spec::{SceneSpec, ZonesNeeded};
 use super::validated::Scene;
 use crate::mesh::Mesh;
-use crate::model::Zone;
+use crate::model::{PointSource, Zone};
 use crate::observe::report::number;
-use crate::scene::points::Points;
 use crate::shape::Barrier;
 use crate::tensor::Vector;
 
@@ -188,14 +187,14 @@ impl<const D: usize> Parts<'_, D> {
         let mut looked_at = 0;
         for c in (0..self.scene.mesh.cell_count()).filter(|&c| self.holds(c)) {
             let (spacing, origin) = match &p.points {
-                Points::Cells => {
+                PointSource::Cells => {
                     if wanted(&self.scene.mesh.centroid(c)) {
                         return true;
                     }
                     continue;
                 }
-                Points::Lattice { spacing, origin } => (*spacing, *origin),
-                Points::Lattices { lattices, of_cell } => {
+                PointSource::Lattice { spacing, origin } => (*spacing, *origin),
+                PointSource::Lattices { lattices, of_cell } => {
                     let own = &lattices[usize::from(of_cell[c])];
                     (own.spacing, own.origin)
                 }

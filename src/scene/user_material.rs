@@ -4,10 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::bounds_checks::{not_negative, positive};
-use super::error::{SceneError, SceneErrorKind};
-use super::spec::{EnergiesSpec, StrainsSpec, TangentSpec, UmatSpec};
+use super::error::SceneError;
+use super::spec::{StrainsSpec, TangentSpec, UmatSpec};
 use super::value::Text;
-use crate::material::{RoutineError, UmatEnergies, UmatSettings, routine_loader};
+use crate::material::{RoutineError, UmatSettings, routine_loader};
 use crate::observe::checkpoint::Fingerprint;
 use crate::peridynamics::Law;
 use crate::peridynamics::laws::{Constants, LocalCorrespondence};
@@ -20,12 +20,9 @@ pub(crate) fn umat<const D: usize>(
     directory: &Path,
 ) -> Result<Arc<dyn Law<D>>, SceneError> {
     let Some(load) = routine_loader() else {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`materials.{name}.umat` names a routine, and this program was built without the feature `umat`"),
-        )
-        .label(spec.library.span.clone(), "cannot be loaded")
-        .help("build it with the feature: cargo build --release -p bondline-cli --features umat"));
+        return Err(SceneError::conflict(format!("`materials.{name}.umat` names a routine, and this program was built without the feature `umat`"))
+            .label(spec.library.span.clone(), "cannot be loaded")
+            .help("build it with the feature: cargo build --release -p bondline-cli --features umat"));
     };
     let place = |key: &str| format!("materials.{name}.umat.{key}");
     let stabilisation = match &spec.stabilisation {
@@ -38,10 +35,11 @@ pub(crate) fn umat<const D: usize>(
     };
     let states = match &spec.state {
         Some(count) if count.value > MOST_STATES => {
-            return Err(SceneError::new(
-                SceneErrorKind::WrongValue,
-                format!("`{}` is {}", place("state"), count.value),
-            )
+            return Err(SceneError::wrong_value(format!(
+                "`{}` is {}",
+                place("state"),
+                count.value
+            ))
             .label(count.span.clone(), "for every point")
             .help(format!("make it {MOST_STATES} or less")));
         }
@@ -58,18 +56,12 @@ pub(crate) fn umat<const D: usize>(
         is_thread_safe: spec.thread_safe,
         temperature: spec.temperature.as_ref().map_or(0.0, |t| t.value),
         length,
-        energies: match spec.energies {
-            EnergiesSpec::Stress => UmatEnergies::Stress,
-            EnergiesSpec::Routine => UmatEnergies::Routine,
-        },
+        energies: spec.energies,
         has_tangent: spec.tangent == TangentSpec::Routine,
         flows_at_constant_volume: spec.mean_dilatation.unwrap_or(true),
     };
     let solid = load(&path, symbol.map(|s| s.value.as_str()), settings).map_err(|error| {
-        let wrong = SceneError::new(
-            SceneErrorKind::File,
-            format!("`{}`: {error}", place("library")),
-        );
+        let wrong = SceneError::file(format!("`{}`: {error}", place("library")));
         match (&error, symbol) {
             (RoutineError::Library { .. }, _) => wrong
                 .label(spec.library.span.clone(), "this library")
@@ -101,13 +93,10 @@ pub(crate) fn add_library(
 ) -> Result<(), SceneError> {
     let path = directory.join(&spec.library.value);
     let bytes = std::fs::read(&path).map_err(|error| {
-        SceneError::new(
-            SceneErrorKind::File,
-            format!(
-                "`materials.{name}.umat.library`: {}: {error}",
-                path.display()
-            ),
-        )
+        SceneError::file(format!(
+            "`materials.{name}.umat.library`: {}: {error}",
+            path.display()
+        ))
         .label(spec.library.span.clone(), "this library")
         .help("the path is relative to the scene file")
     })?;

@@ -328,71 +328,11 @@ impl<'de> Deserialize<'de> for StepTimes {
     }
 }
 
-impl<'de> Deserialize<'de> for Steps {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let spanned = Spanned::<StepTimes>::deserialize(deserializer)?;
-        Ok(Self {
-            span: spanned.span(),
-            choice: spanned.into_inner(),
-        })
-    }
-}
-
 impl<'de> Deserialize<'de> for Expression {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let spanned = Spanned::<Scalar>::deserialize(deserializer)?;
         let span = spanned.span();
         Ok(spanned.into_inner().0.at(span))
-    }
-}
-
-impl<'de> Deserialize<'de> for Number {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let spanned = Spanned::<Constant>::deserialize(deserializer)?;
-        Ok(Self {
-            span: spanned.span(),
-            value: spanned.into_inner().0,
-        })
-    }
-}
-
-impl<'de> Deserialize<'de> for Count {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let spanned = Spanned::<Whole>::deserialize(deserializer)?;
-        Ok(Self {
-            span: spanned.span(),
-            value: spanned.into_inner().0,
-        })
-    }
-}
-
-impl<'de> Deserialize<'de> for Automatic {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let spanned = Spanned::<Chosen>::deserialize(deserializer)?;
-        Ok(Self {
-            span: spanned.span(),
-            value: spanned.into_inner().0,
-        })
-    }
-}
-
-impl<'de> Deserialize<'de> for Every {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let spanned = Spanned::<Typed>::deserialize(deserializer)?;
-        Ok(Self {
-            span: spanned.span(),
-            pace: spanned.into_inner().0,
-        })
-    }
-}
-
-impl<'de> Deserialize<'de> for Text {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let spanned = Spanned::<String>::deserialize(deserializer)?;
-        Ok(Self {
-            span: spanned.span(),
-            value: spanned.into_inner(),
-        })
     }
 }
 
@@ -441,14 +381,27 @@ impl<'de> Deserialize<'de> for List {
     }
 }
 
-impl<'de> Deserialize<'de> for Coordinates {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let spanned = Spanned::<List>::deserialize(deserializer)?;
-        Ok(Self {
-            span: spanned.span(),
-            values: spanned.into_inner().0,
-        })
-    }
+/// Reads values with the places where they are typed.
+macro_rules! spanned {
+    ($($type:ident { $field:ident } of $read:ty: $value:expr;)+) => {$(
+        impl<'de> Deserialize<'de> for $type {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                let read = Spanned::<$read>::deserialize(deserializer)?;
+                let (span, value): (Span, fn($read) -> _) = (read.span(), $value);
+                Ok(Self { $field: value(read.into_inner()), span })
+            }
+        }
+    )+};
+}
+
+spanned! {
+    Number { value } of Constant: |read| read.0;
+    Count { value } of Whole: |read| read.0;
+    Automatic { value } of Chosen: |read| read.0;
+    Every { pace } of Typed: |read| read.0;
+    Steps { choice } of StepTimes: |read| read;
+    Text { value } of String: |read| read;
+    Coordinates { values } of List: |read| read.0;
 }
 
 macro_rules! schema {

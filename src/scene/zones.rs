@@ -2,7 +2,7 @@
 
 use super::bounds_checks;
 use super::default_horizon::horizon_of;
-use super::error::{SceneError, SceneErrorKind};
+use super::error::SceneError;
 use super::places::extent;
 use super::region::{self, Region};
 use super::source::Span;
@@ -40,14 +40,11 @@ fn nonlocal_region<const D: usize>(
             (region, n.span())
         }
         (None, None) => {
-            return Err(SceneError::new(
-                SceneErrorKind::Missing,
-                format!("coupling `{}` needs a nonlocal zone", selected.traits.name),
-            )
-            .label(selected.span.clone(), "couples a local and a nonlocal zone")
-            .help(
-                "add [zones.nonlocal] with a shape, for example box = { min = [...], max = [...] }, or zones = \"auto\"",
-            ));
+            return Err(SceneError::missing(format!("coupling `{}` needs a nonlocal zone", selected.traits.name))
+                .label(selected.span.clone(), "couples a local and a nonlocal zone")
+                .help(
+                    "add [zones.nonlocal] with a shape, for example box = { min = [...], max = [...] }, or zones = \"auto\"",
+                ));
         }
     })
 }
@@ -84,14 +81,11 @@ fn mark_transition<const D: usize>(
         let all = inner.iter().filter(|n| **n).count();
         if !both.is_empty() && both.len() != all {
             let at = mesh.centroid(both[0]);
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                format!(
-                    "`zones.transition` overlaps {} of the {all} cells of `zones.nonlocal`, the first at {:?}",
-                    both.len(),
-                    at.as_slice()
-                ),
-            )
+            return Err(SceneError::conflict(format!(
+                "`zones.transition` overlaps {} of the {all} cells of `zones.nonlocal`, the first at {:?}",
+                both.len(),
+                at.as_slice()
+            ))
             .label(span, "overlaps in part")
             .label(drawn.clone(), "this zone")
             .help("let it enclose the nonlocal zone, or keep the two apart; around = 0.1 does the former"));
@@ -124,10 +118,10 @@ fn mark_transition<const D: usize>(
             }
         }
     } else if needs_transition {
-        return Err(SceneError::new(
-            SceneErrorKind::Missing,
-            format!("coupling `{}` needs a transition zone", traits.name),
-        )
+        return Err(SceneError::missing(format!(
+            "coupling `{}` needs a transition zone",
+            traits.name
+        ))
         .label(selected.span.clone(), "works where both models overlap")
         .help("add [zones.transition] with around = ..., at least one horizon"));
     }
@@ -163,12 +157,11 @@ pub(crate) fn zones<const D: usize>(
             }
         }
         if !zones.contains(&Zone::Nonlocal) {
-            return Err(SceneError::new(
-                SceneErrorKind::Empty,
-                "`zones.skin` takes every cell of `zones.nonlocal`",
-            )
-            .label(span.clone(), "is nowhere thicker than two cells")
-            .help("refine the mesh, enlarge the zone or leave the skin out"));
+            return Err(
+                SceneError::empty("`zones.skin` takes every cell of `zones.nonlocal`")
+                    .label(span.clone(), "is nowhere thicker than two cells")
+                    .help("refine the mesh, enlarge the zone or leave the skin out"),
+            );
         }
     }
     let nonlocal = NonlocalZone {
@@ -180,8 +173,7 @@ pub(crate) fn zones<const D: usize>(
     // partial stress needs no elements: it lets the horizon vary throughout a body
     let needs_elements = !matches!(selected.coupling, CouplingSpec::PartialStress(_));
     if needs_elements && !zones.contains(&Zone::Local) {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
+        return Err(SceneError::conflict(
             "the nonlocal and transition zones hold every cell: nothing is local",
         )
         .label(span, "reaches everywhere")
@@ -191,10 +183,9 @@ pub(crate) fn zones<const D: usize>(
 }
 
 fn empty<const D: usize>(place: &str, span: Span, mesh: &Mesh<D>) -> SceneError {
-    SceneError::new(
-        SceneErrorKind::Empty,
-        format!("`{place}` is empty: no cell has its centroid inside"),
-    )
+    SceneError::empty(format!(
+        "`{place}` is empty: no cell has its centroid inside"
+    ))
     .label(span, "selects no cell")
     .help(format!(
         "move or enlarge it, or refine the mesh there; {}",

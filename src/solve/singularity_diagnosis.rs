@@ -9,6 +9,7 @@ use crate::solve::direct::{Analysis, Factor};
 use crate::solve::direct_params::DirectParams;
 use crate::solve::ordering::Ordering;
 use crate::system::{BlockCsr, Spread};
+use crate::tensor::AXES;
 use nalgebra::{DMatrix, DVector};
 
 /// Sites that can move without resistance.
@@ -30,8 +31,6 @@ const HELD: f64 = 1e-13;
 /// A force this far below the stiffness times the motion is zero: far above the round-off of assembly, far below a
 /// spring that anybody would call a support.
 const NO_FORCE: f64 = 1e-10;
-
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The rigid-body modes of sites in `block` dimensions (1, 3 or 6 of them), values at position `x` relative to a
 /// centre and scaled by `scale` (both keep the numbers near one): `modes[m][component]`.

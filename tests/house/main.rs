@@ -80,10 +80,9 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
 const CIRCLES: [&[&str]; 0] = [];
 
 /// Names that two public types of the library have, most of them what a scene says beside what is made of it; their number may only fall.
-const SHARED_NAMES: [&str; 12] = [
+const SHARED_NAMES: [&str; 11] = [
     "Bound",
     "Carried",
-    "Contact",
     "Explicit",
     "Field",
     "Hardening",

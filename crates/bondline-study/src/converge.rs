@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::line_plot::{LinePlot, Scale, Series, Stroke};
 use bondline::run::{RunError, Samples};
 use bondline::scene::spec::{AxisSpec, MeshSpec, PeridynamicsSpec, PointsSpec};
-use bondline::scene::{SceneError, SceneErrorKind, SceneSpec, Source};
+use bondline::scene::{SceneError, SceneSpec, Source};
 use bondline::{
     observe::{
         ObserveError,
@@ -143,13 +143,10 @@ pub fn converge(
     }
     let scene_error = |e: SceneError| ConvergeError::Scene(Box::new(e));
     let text = regular_file::read_scene(path).map_err(|error| {
-        scene_error(SceneError::new(
-            SceneErrorKind::File,
-            format!(
-                "cannot read the scene {}: {error}; check the path",
-                path.display()
-            ),
-        ))
+        scene_error(SceneError::file(format!(
+            "cannot read the scene {}: {error}; check the path",
+            path.display()
+        )))
     })?;
     let mut source = Source::new(path.display().to_string(), text);
     for o in overrides {
@@ -190,15 +187,11 @@ pub fn converge(
 /// The horizon that a study refines.
 fn typed_horizon(pd: &PeridynamicsSpec) -> Result<f64, SceneError> {
     let Some(typed) = &pd.horizon else {
-        return Err(SceneError::new(
-            SceneErrorKind::Missing,
-            "the scene leaves `peridynamics.horizon` out; a study of convergence refines the one that is typed",
-        )
-        .help("type it: --set peridynamics.horizon=..., `bondline check` says which is taken"));
+        return Err(SceneError::missing("the scene leaves `peridynamics.horizon` out; a study of convergence refines the one that is typed")
+            .help("type it: --set peridynamics.horizon=..., `bondline check` says which is taken"));
     };
     typed.as_constant().ok_or_else(|| {
-        SceneError::new(
-            SceneErrorKind::WrongValue,
+        SceneError::wrong_value(
             "`peridynamics.horizon` varies in space; a study of convergence needs one number",
         )
     })
@@ -213,8 +206,7 @@ fn refined(
 ) -> Result<Vec<String>, SceneError> {
     let mut overrides = Vec::new();
     let Some(pd) = &spec.peridynamics else {
-        return Err(SceneError::new(
-            SceneErrorKind::Missing,
+        return Err(SceneError::missing(
             "the scene has no [peridynamics], hence no horizon to refine with",
         ));
     };
@@ -236,12 +228,9 @@ fn refined(
         ),
         MeshSpec::File(file) => {
             if matches!(pd.points, Some(PointsSpec::Cells)) {
-                return Err(SceneError::new(
-                    SceneErrorKind::Conflict,
-                    "points in the cells of a mesh from a file get no finer: the horizon would shrink over the same points",
-                )
-                .label(file.path.span.clone(), "stays as it is")
-                .help("use a lattice, --set peridynamics.points.lattice.spacing=..., or a mesh that is generated"));
+                return Err(SceneError::conflict("points in the cells of a mesh from a file get no finer: the horizon would shrink over the same points")
+                    .label(file.path.span.clone(), "stays as it is")
+                    .help("use a lattice, --set peridynamics.points.lattice.spacing=..., or a mesh that is generated"));
             }
             ("", Vec::new())
         }

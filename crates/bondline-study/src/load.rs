@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use bondline::model::PointSource;
 use bondline::run::AnyScene;
-use bondline::scene::{Points, Scene, SceneError, Source, read};
+use bondline::scene::{Scene, SceneError, Source, read};
 
 use crate::accuracy;
 
@@ -34,8 +35,8 @@ pub fn from_source(source: &Source, directory: &Path, name: &str) -> Result<AnyS
 pub(crate) fn lattice_spacing(scene: &AnyScene) -> Option<f64> {
     fn of<const D: usize>(scene: &Scene<D>) -> Option<f64> {
         match &scene.peridynamics.as_ref()?.points {
-            Points::Lattice { spacing, .. } => Some(*spacing),
-            Points::Cells | Points::Lattices { .. } => None,
+            PointSource::Lattice { spacing, .. } => Some(*spacing),
+            PointSource::Cells | PointSource::Lattices { .. } => None,
         }
     }
     match scene {

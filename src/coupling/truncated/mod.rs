@@ -78,13 +78,15 @@ pub struct Truncated {
     pub cut_bonds: CutBonds,
 }
 
-/// Treatment in motion of bonds that the seam cuts, where bonds are exact or break.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// Treatment of bonds that the seam cuts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(rename = "CutBondsSpec")]
 pub enum CutBonds {
     /// They rotate, stretch and break like others.
     #[default]
     Breaking,
-    /// They are rows of a matrix, which is cheaper. No bond breaks within a horizon of the seam (two in an LPS); damage that reaches this layer is reported.
+    /// They are linear and do not break: cheaper, where damage stays two horizons away from the seam.
     Linear,
 }
 

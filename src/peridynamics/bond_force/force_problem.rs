@@ -25,12 +25,14 @@ pub enum Layout {
     Lattice,
 }
 
-/// Storage of the bond weights of the list pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Storage of the weights of bonds in scenes in time and load steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(rename = "PrecisionSpec")]
 pub enum Storage {
-    /// Eight bytes: nothing is lost.
+    /// In eight bytes, or not at all where the points fill a lattice.
     Double,
-    /// Four bytes: each weight is off by up to 6e-8 of itself, forces by about 1e-8 (`docs/performance.md` has it measured).
+    /// One by one, in four bytes: forces are off by about 1e-8 of themselves.
     Single,
 }
 

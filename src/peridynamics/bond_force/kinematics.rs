@@ -1,12 +1,14 @@
 //! Kinematics of bonds under a motion: exact, or to first order.
 
-/// Kinematics of bonds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// Dependence of the bond force on the displacement.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(rename = "BondsSpec")]
 pub enum BondKinematics {
-    /// Bonds rotate and stretch: any displacement.
+    /// Along the deformed bond, by its stretch.
     #[default]
     Exact,
-    /// Linear in the displacement, as the static operators are.
+    /// Along the undeformed bond, to first order of the displacement.
     Linear,
 }
 

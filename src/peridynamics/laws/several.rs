@@ -13,13 +13,16 @@ use crate::{
     tensor::{Tensor, Tensor4, Vector},
 };
 
-/// The stiffness of a bond between two materials of a law that acts bond by bond.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// The stiffness of a bond between two materials, by those of bonds within each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
+#[schemars(rename = "StiffnessSpec")]
 pub enum StiffnessMean {
-    /// `2 a b/(a + b)`: the two halves of the bond in series.
+    /// `2 a b/(a + b)`, as of two halves in series.
     #[default]
+    #[serde(rename = "harmonic-mean")]
     Harmonic,
-    /// `(a + b)/2`: each end gives the half that it gives to its own material.
+    /// `(a + b)/2`.
+    #[serde(rename = "arithmetic-mean")]
     Arithmetic,
 }
 

@@ -25,16 +25,18 @@ pub use lattice::{LatticeCell, lattice_cells, lattice_shells, orbit};
 
 use crate::tensor::Vector;
 
-/// An algorithm for the quadrature weight `V_j^(i)` of a bond, as a share of the volume of the cell of its far point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// Partial volumes of the cells that the horizon cuts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "VolumesSpec")]
 pub enum PartialVolume {
-    /// FL, FA, FV: the whole cell if its point lies within the horizon.
+    /// A cell counts wholly if its point lies within the horizon (FL, FA, FV).
     Full,
-    /// PL-, PA-, PV-PDLAMMPS: a ramp for points within the horizon.
+    /// A linear ramp over the last half spacing within the horizon.
     PdLammps,
-    /// PL-, PA-, PV-HHB: the ramp, also for points up to half a spacing beyond the horizon.
+    /// The ramp of Hu, Ha and Bobaru, which goes on to half a spacing beyond the horizon.
     Hhb,
-    /// The measure of the intersection itself; PA-AC in 2D.
+    /// The length, area or volume itself that the horizon cuts from the cell.
     Exact,
 }
 

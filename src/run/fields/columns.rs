@@ -8,9 +8,7 @@ use crate::parallel;
 use crate::run::solution::Solved;
 use crate::run::stresses;
 use crate::scene::validated::FieldChoice;
-use crate::tensor::padded;
-
-const AXES: [&str; 3] = ["x", "y", "z"];
+use crate::tensor::{AXES, padded};
 
 /// Places of which values are held at a time.
 const CHUNK: usize = 4096;

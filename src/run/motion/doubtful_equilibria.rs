@@ -38,7 +38,7 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
         Self {
             model,
             rest: setup.rest,
-            traits: setup.traits,
+            traits: setup.setup.traits,
             terms: Arc::clone(&setup.terms),
             uniform: setup.proof.largest("stress error"),
             force: Vector::zeros(),

@@ -2,9 +2,7 @@
 
 #![deny(clippy::wildcard_enum_match_arm)]
 
-use crate::coupling::semidiscrete::behaviour::{
-    BondBehaviour, BondThreshold, ContactBehaviour, SystemError,
-};
+use crate::coupling::semidiscrete::behaviour::{BondBehaviour, BondThreshold, SystemError};
 use crate::coupling::semidiscrete::{CoupledSystem, masses};
 use crate::fem::Locator;
 use crate::observe::report::number;
@@ -24,7 +22,7 @@ use crate::run::thermal::Thermal;
 use crate::scene::failure::{Breaking, SofteningChoice};
 use crate::scene::initial::InitialKind;
 use crate::scene::region::Region;
-use crate::scene::spec::{BondsSpec, CalibrationSpec, PrecisionSpec};
+use crate::scene::spec::CalibrationSpec;
 use crate::solve::explicit::State;
 use crate::system::{LinearMotion, Ranks, SemiDiscrete};
 use crate::tensor::Vector;
@@ -76,7 +74,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
         BondKinematics::Exact => "geometrically exact bonds",
         BondKinematics::Linear => "bonds linear in the displacement",
     };
-    let storage = storage(breaking.precision);
+    let storage = breaking.precision;
     let breaks = failure_text(model, failure.as_ref(), breaking);
     let by_state = matches!(failure, Some(BondThreshold::State(_)));
     let can_fail_nowhere = |x: &_| breaking.no_fail.iter().any(|r| r.contains(x, 0.0));
@@ -94,10 +92,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
             failure: failure.clone(),
             softening: breaking.softening.softening(),
             no_fail: &can_fail_nowhere,
-            contact: breaking.contact.map(|c| ContactBehaviour {
-                approach: c.radius_factor,
-                stiffness: c.stiffness_factor,
-            }),
+            contact: breaking.contact,
             storage,
             heat: thermal.map(Thermal::free_stretch),
             broken: start.broken,
@@ -150,7 +145,7 @@ fn is_linear<const D: usize>(
     let breaking = &rest.breaking;
     failure.is_none()
         && breaking.contact.is_none()
-        && breaking.bonds == BondsSpec::Linear
+        && breaking.bonds == BondKinematics::Linear
         && (model.peridynamics.as_ref()).is_none_or(|p| p.law.is_linear())
         && !rest.has_nonlinear_elements(model)
 }
@@ -163,14 +158,6 @@ fn sharing_steps<const D: usize>(
     match sharing {
         Sharing::Nothing => motion,
         Sharing::Steps | Sharing::Families => motion.with_shared_steps(),
-    }
-}
-
-/// Returns the storage of the weights of bonds.
-fn storage(precision: PrecisionSpec) -> Storage {
-    match precision {
-        PrecisionSpec::Double => Storage::Double,
-        PrecisionSpec::Single => Storage::Single,
     }
 }
 

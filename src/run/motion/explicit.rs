@@ -7,17 +7,16 @@ use super::guard::{Balance, energies_are_apart};
 use super::impact_record::ImpactRecord;
 use super::initial_state::{PreStep, RezoneState};
 use super::rezoning::{Leaving, share};
-use super::saved::{Saved, SavedZone};
+use super::saved::{EdgeReached, Saved, SavedZone, StepChoice};
 use super::setup::{ModelSetup, RunSetup, begun, lay_out, opened};
 use super::sharing::sharing;
 use super::step_observer::{Segment, StepObserver, Stop, Watched};
-use super::writer::Moment;
+use super::writer::{Moment, Recorder};
 use crate::observe::checkpoint::{CheckpointError, CheckpointFile};
 use crate::observe::cracks::CrackSummary;
 use crate::observe::proof::{Part, Proof};
 use crate::observe::summary::{
-    Decision, Ended, EnergyGain, MotionSummary, Rotation, RunSummary, Stopwatch, Timings,
-    peak_memory_bytes,
+    Ended, EnergyGain, MotionSummary, Rotation, RunSummary, Stopwatch, peak_memory_bytes,
 };
 use crate::progress::Progress;
 use crate::run::error::{RunError, explained};
@@ -25,7 +24,6 @@ use crate::run::loads;
 use crate::run::setup::{RunSettings, sizes};
 use crate::run::warnings::{of_elements, unusual_stretch, warnings, without_response};
 use crate::scene::solve::Explicit as Spec;
-use crate::scene::spec::CouplingTraits;
 use crate::scene::validated::Scene;
 use crate::solve::explicit::{Explicit, ExplicitParams, State};
 use crate::system::SemiDiscrete;
@@ -81,28 +79,19 @@ pub(crate) fn run<const D: usize>(
         sharing: sharing(&problem, &rest, options),
     };
     loop {
-        let (segment, back) = match from {
-            From::Start(..) => lay_out(begun, problem, &rest, start, progress, |laid_out| {
-                run_segment(laid_out, from, &rest, spec, options, progress)
-            })?,
-            From::Switch(mut between) => {
-                let bonds = std::mem::take(&mut between.broken);
-                let start = LayoutStart {
-                    broken: Some(&bonds),
-                    ..start
-                };
-                lay_out(begun, problem, &rest, start, progress, |laid_out| {
-                    run_segment(
-                        laid_out,
-                        From::Switch(between),
-                        &rest,
-                        spec,
-                        options,
-                        progress,
-                    )
-                })?
-            }
+        let bonds = match &mut from {
+            From::Start(..) => None,
+            From::Switch(between) => Some(std::mem::take(&mut between.broken)),
         };
+        let start = LayoutStart {
+            broken: bonds.as_ref(),
+            ..start
+        };
+        let (segment, back) = lay_out(begun, problem, &rest, start, progress, |laid_out| {
+            let model = laid_out.model;
+            run_segment(laid_out, from, &rest, spec, options, progress)
+                .map_err(|error| explained(error, model, &model.local_laws(&rest.local_laws)))
+        })?;
         problem = back;
         match segment {
             RunSegment::Ended(summary) => return Ok(*summary),
@@ -125,30 +114,12 @@ fn zones_of(nonlocal: &[bool]) -> Vec<Zone> {
 
 /// Record of a run at the end of a segment, whatever follows.
 struct SegmentRecord {
-    title: String,
-    traits: CouplingTraits,
-    remedy: &'static str,
-    choices: Vec<Decision>,
+    setup: RunSetup,
     proof: Proof,
-    timings: Timings,
     /// Part of the proof about growing modes.
     growth: Option<Part>,
     /// Steps taken by this program, and their seconds.
     taken: (u64, f64),
-}
-
-/// Steps with one layout of the zones, from the beginning, a checkpoint, or where the last one ended.
-fn run_segment<'r, const D: usize>(
-    laid_out: ModelSetup<'_, D>,
-    from: From<'r, D>,
-    rest: &'r RunSettings<D>,
-    spec: &Spec,
-    options: &RunOptions<'r>,
-    progress: &dyn Progress,
-) -> Result<RunSegment<'r, D>, RunError> {
-    let model = laid_out.model;
-    take_segment(laid_out, from, rest, spec, options, progress)
-        .map_err(|error| explained(error, model, &model.local_laws(&rest.local_laws)))
 }
 
 /// Decides whether the balance of energy is watched: a proof for the undeformed body need not hold for one whose law changes with its strain.
@@ -172,9 +143,9 @@ fn balance_of<const D: usize>(
     }
 }
 
-/// The steps of [`run_segment`].
+/// Steps with one layout of the zones, from the beginning, a checkpoint, or where the last one ended.
 // One function: what a segment is made of, in the order in which it is found.
-fn take_segment<'r, const D: usize>(
+fn run_segment<'r, const D: usize>(
     laid_out: ModelSetup<'_, D>,
     from: From<'r, D>,
     rest: &'r RunSettings<D>,
@@ -183,14 +154,9 @@ fn take_segment<'r, const D: usize>(
     progress: &dyn Progress,
 ) -> Result<RunSegment<'r, D>, RunError> {
     let (model, operator, proved) = (laid_out.model, laid_out.operator, laid_out.proved);
-    let mut watch = laid_out.watch;
     let mut record = SegmentRecord {
-        title: laid_out.title,
-        traits: laid_out.traits,
-        remedy: laid_out.remedy,
-        choices: laid_out.choices,
+        setup: laid_out.setup,
         proof: laid_out.proof,
-        timings: laid_out.timings,
         growth: None,
         taken: (0, 0.0),
     };
@@ -202,11 +168,8 @@ fn take_segment<'r, const D: usize>(
         spec,
         moving: laid_out.moving,
         terms: laid_out.terms,
-        remedy: record.remedy,
         proved,
-        choices: &mut record.choices,
-        timings: &mut record.timings,
-        watch: &mut watch,
+        setup: &mut record.setup,
     };
     let mut begin = match from {
         From::Start(file, saved) => before.at_start(*options, file, saved.map(|saved| *saved))?,
@@ -236,8 +199,8 @@ fn take_segment<'r, const D: usize>(
     let system = begin.moving.system.as_mut();
     let mut motion = Explicit::new(system, &begin.drive, params, begin.state)?;
     observer.begin(&motion, begin.resumed, begin.due)?;
-    watch.lap(&mut record.timings, "start");
-    let (steps, seconds) = observer.take_steps(&mut motion, &mut record.timings)?;
+    record.setup.lap("start");
+    let (steps, seconds) = observer.take_steps(&mut motion, &mut record.setup.timings)?;
     record.growth = begin.growth;
     let (steps_before, seconds_before) = begin.taken;
     record.taken = (steps_before + steps, seconds_before + seconds);
@@ -259,7 +222,7 @@ fn take_segment<'r, const D: usize>(
 impl SegmentRecord {
     /// Returns the state that the next segment needs, where the zones change to `nonlocal` cells.
     fn rezone<'r, const D: usize>(
-        self,
+        mut self,
         observer: StepObserver<'_, 'r, D>,
         told: usize,
         system: &dyn SemiDiscrete,
@@ -267,19 +230,13 @@ impl SegmentRecord {
         nonlocal: Vec<bool>,
     ) -> RunSegment<'r, D> {
         let Segment { model, pace, .. } = *observer.segment;
-        let next = RunSetup {
-            title: self.title,
-            traits: self.traits,
-            remedy: self.remedy,
-            choices: self.choices,
-            timings: Timings::default(),
-            watch: Stopwatch::start(),
-        };
+        let timings = std::mem::take(&mut self.setup.timings);
+        self.setup.watch = Stopwatch::start();
         let state_of_body = system.body_state();
         let broken = state_of_body.map_or(Vec::new(), |state| state.broken_bonds());
         let between = RezoneState {
             told,
-            timings: self.timings,
+            timings,
             broken: BrokenBonds::of(model, &broken),
             spent: system.dissipation(),
             leaving: Leaving::of(model, system, state),
@@ -293,7 +250,7 @@ impl SegmentRecord {
             growth: self.growth,
             taken: self.taken,
         };
-        RunSegment::Switch(next, Box::new(between))
+        RunSegment::Switch(self.setup, Box::new(between))
     }
 
     /// The summary of a run that ends here.
@@ -316,7 +273,7 @@ impl SegmentRecord {
         let energy_gain = observer.guard.energy_gain();
         let rotation = observer.guard.rotation();
         self.proof.parts.extend(self.growth.take());
-        let mut told = warnings(model, self.traits, &self.proof);
+        let mut told = warnings(model, self.setup.traits, &self.proof);
         told.extend(of_elements(model, &model.local_laws(&rest.local_laws)));
         told.extend(unusual_stretch(model, rest)?);
         told.extend(without_response(motion.system(), &motion.state().u));
@@ -339,13 +296,13 @@ impl SegmentRecord {
             ..motion_summary(observer, motion, ended, energy_gain, self.taken)?
         };
         Ok(RunSummary {
-            scene: self.title,
+            scene: self.setup.title,
             dimension: D,
-            coupling: self.traits.name.to_owned(),
+            coupling: self.setup.traits.name.to_owned(),
             sizes: sizes(model, operator),
-            choices: self.choices,
-            total_seconds: self.timings.total(),
-            timings: self.timings,
+            choices: self.setup.choices,
+            total_seconds: self.setup.timings.total(),
+            timings: self.setup.timings,
             peak_memory_bytes: peak_memory_bytes(),
             warnings: told,
             proof: self.proof,
@@ -372,36 +329,26 @@ fn motion_summary<const D: usize>(
     taken: (u64, f64),
 ) -> Result<MotionSummary, RunError> {
     let Segment {
-        model, rest, pace, ..
+        model,
+        rest,
+        pace,
+        breaks,
+        ..
     } = *observer.segment;
     let moment = Moment::of(motion, observer.segment.is_linear);
-    let state = moment.state;
-    let stored = moment.system.stored_energy(&state.u);
-    let area = (observer.recorder).crack_area(state.broken, moment.system);
-    let plane = plane_energy(model, rest)?;
-    let zone = observer.zone;
+    let (zone, edge) = (observer.zone, observer.edge);
     let (switches, shares) = zone.map_or((Vec::new(), [0.0; 2]), |z| (z.switches, z.shares));
-    let at_start = observer.recorder.energy_at_start;
+    let now = (moment.state, moment.system, moment.kinetic);
+    let summary = end_of_steps(
+        (model, rest),
+        &mut observer.recorder,
+        now,
+        (breaks, edge, pace),
+    )?;
     Ok(MotionSummary {
         ended,
-        steps: state.step,
-        of_steps: pace.steps,
-        time: state.time,
-        step: pace.step,
         stable_step: Some(pace.stable),
-        kinetic_energy: moment.kinetic,
-        stored_energy: stored,
-        external_work: state.work,
-        missing_energy: at_start + state.work - moment.kinetic - stored,
         energy_gain,
-        cracks: cracks(moment.system, observer.segment.breaks, area, plane),
-        inelastic_energy: inelastic_energy(moment.system),
-        impactors: (observer.recorder.impact.as_ref()).map_or(Vec::new(), |i| i.summary(state)),
-        broken_bonds: state.broken,
-        edge_reached: observer.edge.map(|e| {
-            let x = model.sites[e.site as usize].position;
-            (e.time, x.iter().copied().collect())
-        }),
         steps_per_second: if taken.0 > 0 {
             taken.0 as f64 / taken.1
         } else {
@@ -409,12 +356,52 @@ fn motion_summary<const D: usize>(
         },
         nonlocal_share: [shares[0], shares[1], share(model)],
         switches,
+        ..summary
+    })
+}
+
+/// Energies and cracks at the end of steps in time or of load steps: of a state with its system and its kinetic energy.
+///
+/// # Errors
+/// [`RunError::Fracture`].
+pub(super) fn end_of_steps<const D: usize>(
+    (model, rest): (&Model<D>, &RunSettings<D>),
+    recorder: &mut Recorder<'_, D>,
+    (state, system, kinetic): (&State, &dyn SemiDiscrete, f64),
+    (breaks, edge, pace): (Breaks, Option<EdgeReached>, StepChoice),
+) -> Result<MotionSummary, RunError> {
+    let stored = system.stored_energy(&state.u);
+    let plane = plane_energy(model, rest)?;
+    let area = recorder.crack_area(state.broken, system);
+    Ok(MotionSummary {
+        ended: Ended::Finished,
+        steps: state.step,
+        of_steps: pace.steps,
+        time: state.time,
+        step: pace.step,
+        stable_step: None,
+        kinetic_energy: kinetic,
+        stored_energy: stored,
+        external_work: state.work,
+        missing_energy: recorder.energy_at_start + state.work - kinetic - stored,
+        energy_gain: None,
+        cracks: cracks(system, breaks, area, plane),
+        inelastic_energy: inelastic_energy(system),
+        impactors: (recorder.impact.as_ref()).map_or(Vec::new(), |i| i.summary(state)),
+        broken_bonds: state.broken,
+        edge_reached: edge.map(|e| {
+            let x = model.sites[e.site as usize].position;
+            (e.time, x.iter().copied().collect())
+        }),
+        steps_per_second: 0.0,
+        switches: Vec::new(),
+        nonlocal_share: [0.0; 3],
         processes: Vec::new(),
     })
 }
 
 /// Returns the dissipation by breaking bonds so far, and the area of the cracks; none where no bond can break.
-pub(crate) fn cracks(
+fn cracks(
     system: &dyn SemiDiscrete,
     breaks: Breaks,
     area: f64,
@@ -436,7 +423,7 @@ pub(crate) fn cracks(
 }
 
 /// Returns the energy that a law with history variables has dissipated; none if that is zero.
-pub fn inelastic_energy(system: &dyn SemiDiscrete) -> Option<f64> {
+fn inelastic_energy(system: &dyn SemiDiscrete) -> Option<f64> {
     let inelastic = system.dissipation().map(|d| d.inelastic);
     inelastic.filter(|energy| *energy != 0.0)
 }

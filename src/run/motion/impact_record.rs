@@ -9,9 +9,7 @@ use crate::observe::report::number;
 use crate::observe::summary::ImpactorSummary;
 use crate::scene::impactors::Impactor;
 use crate::solve::explicit::State;
-use crate::tensor::Vector;
-
-const AXES: [&str; 3] = ["x", "y", "z"];
+use crate::tensor::{AXES, Vector};
 
 /// The largest force of an impactor on the body so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -7,17 +7,16 @@ use super::breaks::breaks;
 use super::driven_impactors::prescribed;
 use super::dynamic_system::{DynamicSystem, start};
 use super::impact::impacted;
-use super::impact_record::ImpactRecord;
 use super::rezoning::Leaving;
 use super::saved::{EdgeReached, Saved, SavedZone, StepChoice};
-use super::setup::restore;
+use super::setup::{RunSetup, recorder, restore};
 use super::time_dependent_loads::SceneDrive;
 use super::time_step::{held, paced, repaced};
 use super::writer::Recorder;
 use crate::coupling::impact::RESOLVED;
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::proof::Part;
-use crate::observe::summary::{Decision, Stopwatch, Timings, bytes_text};
+use crate::observe::summary::{Decision, Timings, bytes_text};
 use crate::run::condition_terms::ConditionTerms;
 use crate::run::error::RunError;
 use crate::run::loads::BodyForces;
@@ -84,13 +83,9 @@ pub(crate) struct PreStep<'a, 'r, 'm, const D: usize> {
     pub moving: DynamicSystem<'m>,
     /// Springs that hold the body.
     pub terms: Arc<ConditionTerms>,
-    /// Remedy for modes that grow.
-    pub remedy: &'static str,
     /// Evidence that none does, if there is any.
     pub proved: Option<&'static str>,
-    pub choices: &'a mut Vec<Decision>,
-    pub timings: &'a mut Timings,
-    pub watch: &'a mut Stopwatch,
+    pub setup: &'a mut RunSetup,
 }
 
 impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
@@ -108,22 +103,23 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         let mut held = held(model, &rest.conditions)?;
         held.extend(prescribed(&rest.impactors, model.sites.len()));
         let begin = start(model, rest);
-        let (moving, impact) = impacted(model, rest, self.moving, &begin, RESOLVED, self.choices)?;
-        self.choices.push(Decision {
+        let choices = &mut self.setup.choices;
+        let (moving, impact) = impacted(model, rest, self.moving, &begin, RESOLVED, choices)?;
+        choices.push(Decision {
             choice: format!("{} in rows and bonds", bytes_text(moving.bytes as u64)),
             why: "read once per step".to_owned(),
         });
         let known = saved.as_ref().map(|saved| saved.pace);
         let asked = GrowthQuestion {
-            remedy: self.remedy,
+            remedy: self.setup.remedy,
             proved: self.proved,
             policy: spec.growing_modes,
             place: &|site| model.sites[site].position.iter().copied().collect(),
             ranks: options.ranks,
             free_from: free_start((model, rest), moving.is_linear, &begin)?,
         };
-        let (mut moving, pace, growth) = paced(spec, &asked, moving, &held, known, self.choices)?;
-        self.watch.lap(self.timings, "stable step");
+        let (mut moving, pace, growth) = paced(spec, &asked, moving, &held, known, choices)?;
+        self.setup.lap("stable step");
         let system = (moving.system.as_ref(), moving.is_linear);
         let drive = driven(model, rest, &begin.u, &pace, spec)?.heated(
             rest.stresses.thermal.as_ref(),
@@ -131,7 +127,7 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
             system,
         )?;
         if drive.evaluates_everywhere() {
-            self.choices.push(Decision {
+            self.setup.choices.push(Decision {
                 choice: "loads evaluated at every place and step".to_owned(),
                 why: "an expression holds both t and a coordinate; written as two conditions, each with one, it would cost nothing"
                     .to_owned(),
@@ -139,21 +135,13 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         }
         restore(moving.system.as_mut(), saved.as_ref(), &file)?;
         let written = saved.as_ref().map(|s| &s.written);
-        let peaks = written.map(|w| &w.peaks[..]);
-        let mut recorder = Recorder::new(
-            &rest.output,
-            &rest.conditions,
-            &Sampler::new(model),
-            impact.map(|impact| ImpactRecord::new(impact, &rest.impactors, peaks)),
+        let of = (
+            impact,
             breaks(moving.system.as_ref(), rest),
             moving.is_linear,
-            file,
-            RunOptions {
-                checkpoint_every: options.checkpoint_every.or(spec.checkpoint_every),
-                ..options
-            },
-            written,
-        )?;
+        );
+        let every = (options, spec.checkpoint_every);
+        let mut recorder = recorder((model, rest), every, of, file, written)?;
         recorder.hold(drive.holders());
         recorder.cut(model, rest, self.terms)?;
         let resumed = saved.is_some();
@@ -172,7 +160,7 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
             zone: zone.or_else(|| rest.follow.as_ref().map(|_| SavedZone::first(model))),
             seen,
             growth,
-            told: self.choices.len(),
+            told: self.setup.choices.len(),
             taken: (0, 0.0),
             resumed,
             due: false,
@@ -206,11 +194,11 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         if let Some(spent) = spent {
             self.moving.system.set_dissipation(spent);
         }
-        self.choices.truncate(told);
+        self.setup.choices.truncate(told);
         let held = held(model, &rest.conditions)?;
         let system = self.moving.system.as_ref();
         let pace = repaced(spec, system, &held, pace, leaving.state())?;
-        self.watch.lap(self.timings, "stable step");
+        self.setup.lap("stable step");
         let begin = start(model, rest);
         let drive = driven(model, rest, &begin.u, &pace, spec)?;
         let (state, switch) = leaving.arrive(model, system, &drive)?;
@@ -218,10 +206,11 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         recorder.hold(drive.holders());
         recorder.cut(model, rest, self.terms)?;
         recorder.energy_at_start += switch.left();
-        self.watch.lap(self.timings, "state carried over");
-        let own = std::mem::replace(self.timings, before);
+        self.setup.lap("state carried over");
+        let own = std::mem::replace(&mut self.setup.timings, before);
         for stage in &own.stages {
-            self.timings
+            self.setup
+                .timings
                 .add(&format!("zone changes: {}", stage.name), stage.seconds);
         }
         Ok(StepState {

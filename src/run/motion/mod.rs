@@ -68,8 +68,7 @@ pub(crate) use sharing::{Sharing, holders_at_rest, may_share, may_share_rows, mo
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::observe::checkpoint::Pace;
-use crate::observe::csv::Entry;
-use crate::observe::history::History;
+use crate::observe::csv::{CsvTable, Entry};
 use crate::observe::summary::RunSummary;
 use crate::observe::{ObserveError, Observer};
 use crate::progress::Progress;
@@ -119,12 +118,12 @@ impl<'a> RunOptions<'a> {
     }
 
     /// Appends a row to a table, and shows it to the observer.
-    fn keep(&self, name: &str, table: &mut History, row: &[Entry]) -> Result<(), ObserveError> {
+    fn keep(&self, name: &str, table: &mut CsvTable, row: &[Entry]) -> Result<(), ObserveError> {
         if let Some(observer) = self.observer {
             observer.row(name, table.header(), row);
         }
         match self.writes() {
-            true => table.row(row),
+            true => table.entries(row),
             false => Ok(()),
         }
     }

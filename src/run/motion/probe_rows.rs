@@ -1,9 +1,7 @@
 //! Columns of the history for the probes.
 
 use crate::model::Sampler;
-use crate::tensor::Vector;
-
-const AXES: [&str; 3] = ["x", "y", "z"];
+use crate::tensor::{AXES, Vector};
 
 /// The probes of a scene with the sites that each follows.
 pub(super) struct ProbeRows<'a, const D: usize> {

@@ -9,8 +9,8 @@ use super::RunOptions;
 use super::breaks::{Breaks, breaks, damage_at_edge};
 use super::created_energy::{created_energy, set_free};
 use super::doubtful_equilibria::DoubtfulEquilibria;
-use super::dynamic_system::{failing_stretch, plane_energy, start};
-use super::explicit::{cracks, inelastic_energy};
+use super::dynamic_system::{failing_stretch, start};
+use super::explicit::end_of_steps;
 use super::guard::energies_are_apart;
 use super::impact::{BodyOnly, impacted};
 use super::impact_record::ImpactRecord;
@@ -18,11 +18,12 @@ use super::inside_step::InsideStep;
 use super::load_step_params::{equilibrium_params, step_choice};
 use super::parted::has_parted;
 use super::saved::{EdgeReached, Saved, StepChoice};
-use super::setup::{ModelSetup, laid_out, opened, restore};
+use super::setup::{ModelSetup, RunSetup, laid_out, opened, recorder, restore};
 use super::spread_factors::Leads;
 use super::step_observer::FieldOutput;
 use super::time_dependent_loads::SceneDrive;
 use super::writer::{Moment, Recorder};
+use crate::model::Model;
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::summary::{
@@ -46,10 +47,6 @@ use crate::solve::quasi_static::{
     Refactor, TangentFactors,
 };
 use crate::system::SemiDiscrete;
-use crate::{
-    coupling::Impact,
-    model::{Model, Sampler},
-};
 
 /// Runs a scene under a load that grows.
 pub(crate) fn run<const D: usize>(
@@ -93,8 +90,14 @@ fn load_steps<const D: usize>(
     let (model, operator, rest) = (laid_out.model, laid_out.operator, laid_out.rest);
     let doubts = DoubtfulEquilibria::new(&laid_out);
     let parts = linear_parts(&laid_out, options)?;
-    let (mut timings, mut watch, mut choices) =
-        (laid_out.timings, laid_out.watch, laid_out.choices);
+    let RunSetup {
+        title,
+        traits,
+        mut choices,
+        mut timings,
+        mut watch,
+        ..
+    } = laid_out.setup;
     let begin = start(model, rest);
     let (moving, impact) = impacted(model, rest, laid_out.moving, &begin, 1.0, &mut choices)?;
     let (mut system, is_linear) = (moving.system, moving.is_linear);
@@ -110,7 +113,10 @@ fn load_steps<const D: usize>(
     let at = saved.as_ref();
     restore(system.as_mut(), at, &file)?;
     let breaks = breaks(system.as_ref(), rest);
-    let mut recorder = recorder((model, rest), spec, options, (impact, breaks), file, at)?;
+    let every = spec.checkpoint_every;
+    let written = at.map(|saved| &saved.written);
+    let of = (impact, breaks, false);
+    let mut recorder = recorder((model, rest), (*options, every), of, file, written)?;
     recorder.hold(drive.holders());
     recorder.cut(model, rest, Arc::clone(&laid_out.terms))?;
     let (edge, seen) = at.map_or_else(Default::default, |s| (s.edge, s.seen.clone()));
@@ -148,11 +154,11 @@ fn load_steps<const D: usize>(
     let taken = observer.take_steps(system.as_mut(), params, near, &mut loaded, &mut timings);
     choices.push(observer.spent());
     let summary = observer.summary(system.as_ref(), first, taken?)?;
-    let of_model = warnings(model, laid_out.traits, &laid_out.proof).into_iter();
+    let of_model = warnings(model, traits, &laid_out.proof).into_iter();
     let of_model = of_model.chain(of_elements(model, &model.local_laws(&rest.local_laws)));
     Ok(RunSummary {
-        scene: laid_out.title,
-        coupling: laid_out.traits.name.to_owned(),
+        scene: title,
+        coupling: traits.name.to_owned(),
         sizes: sizes(model, operator),
         choices,
         total_seconds: timings.total(),
@@ -171,36 +177,6 @@ fn linear_parts<'a, const D: usize>(
 ) -> Result<LinearParts<'a, D>, RunError> {
     let how = (RunKind::LoadSteps, of.moving.has_exact_seam);
     LinearParts::new(of.model, of.operator, of.rest, how, options.ranks)
-}
-
-/// The files of a run, from its beginning or cut back to a checkpoint.
-///
-/// # Errors
-/// [`ObserveError`] for files that cannot be made or cut.
-fn recorder<'a, const D: usize>(
-    (model, rest): (&Model<D>, &'a RunSettings<D>),
-    spec: &Spec,
-    options: &RunOptions<'a>,
-    (impact, breaks): (Option<Arc<Impact<D>>>, Breaks),
-    file: CheckpointFile,
-    saved: Option<&Saved>,
-) -> Result<Recorder<'a, D>, ObserveError> {
-    let peaks = saved.map(|s| &s.written.peaks[..]);
-    let impact = impact.map(|impact| ImpactRecord::new(impact, &rest.impactors, peaks));
-    Recorder::new(
-        &rest.output,
-        &rest.conditions,
-        &Sampler::new(model),
-        impact,
-        breaks,
-        false,
-        file,
-        RunOptions {
-            checkpoint_every: options.checkpoint_every.or(spec.checkpoint_every),
-            ..*options
-        },
-        saved.map(|s| &s.written),
-    )
 }
 
 /// Returns the reason why a resumed run has ended at its checkpoint already; [`Ended::Finished`] if it has not.
@@ -509,37 +485,18 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         seconds: f64,
     ) -> Result<RunSummary, RunError> {
         let (model, state) = (self.model, &self.state);
-        let area = self.recorder.crack_area(state.broken, system);
-        let stored = system.stored_energy(&state.u);
         let (_, applied) = loads::loads(model, &self.rest.conditions, state.time)?;
-        let plane = plane_energy(model, self.rest)?;
+        let of = (self.breaks, self.edge, self.pace);
+        let now = (state, system, 0.0);
+        let summary = end_of_steps((model, self.rest), &mut self.recorder, now, of)?;
         let motion = MotionSummary {
             ended: self.ended,
-            steps: state.step,
             of_steps: match self.spec.accuracy {
                 None => self.pace.steps,
                 Some(_) => state.step,
             },
-            time: state.time,
-            step: self.pace.step,
-            stable_step: None,
-            kinetic_energy: 0.0,
-            stored_energy: stored,
-            external_work: state.work,
-            missing_energy: self.recorder.energy_at_start + state.work - stored,
-            energy_gain: None,
-            cracks: cracks(system, self.breaks, area, plane),
-            inelastic_energy: inelastic_energy(system),
-            impactors: (self.recorder.impact.as_ref()).map_or(Vec::new(), |i| i.summary(state)),
-            broken_bonds: state.broken,
-            edge_reached: self.edge.map(|e| {
-                let x = model.sites[e.site as usize].position;
-                (e.time, x.iter().copied().collect())
-            }),
             steps_per_second: (state.step - first) as f64 / seconds.max(f64::MIN_POSITIVE),
-            switches: Vec::new(),
-            nonlocal_share: [0.0; 3],
-            processes: Vec::new(),
+            ..summary
         };
         let warnings = without_response(system, &state.u).into_iter();
         let horizon = model

@@ -1,13 +1,17 @@
 //! Set-up of every run in time or in load steps: the model, its rows and bonds, and the checkpoint that it goes on from.
 
+use super::breaks::Breaks;
 use super::dynamic_system::{DynamicSystem, LayoutStart, dynamic};
 use super::guard::energies_are_apart;
-use super::saved::Saved;
+use super::impact_record::ImpactRecord;
+use super::saved::{Saved, Written};
 use super::sharing::Sharing;
+use super::writer::Recorder;
 use super::{RunOptions, StartFrom};
 use std::sync::Arc;
 
-use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found};
+use crate::observe::ObserveError;
+use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found, Pace};
 use crate::observe::proof::Proof;
 use crate::observe::summary::{Decision, Stopwatch, Timings, resident_memory_bytes};
 use crate::progress::Progress;
@@ -19,18 +23,14 @@ use crate::scene::spec::CouplingTraits;
 use crate::scene::validated::Scene;
 use crate::system::{Ranks, SemiDiscrete, WithTerms};
 use crate::{
-    coupling::{Operator, Problem},
-    model::Model,
+    coupling::{Impact, Operator, Problem},
+    model::{Model, Sampler},
 };
 
 /// A scene with all that it computes before its first step.
 pub struct ModelSetup<'a, const D: usize> {
-    /// The title of the scene.
-    pub title: String,
-    /// Coupling of its bodies.
-    pub traits: CouplingTraits,
-    /// Change of the scene that helps where a mode may grow.
-    pub remedy: &'static str,
+    /// The data that stay when zones change.
+    pub(crate) setup: RunSetup,
     /// Evidence that no mode grows, if there is any.
     pub proved: Option<&'static str>,
     /// Sites, families and zones.
@@ -43,26 +43,33 @@ pub struct ModelSetup<'a, const D: usize> {
     pub moving: DynamicSystem<'a>,
     /// Springs that hold the body; the system has them.
     pub(crate) terms: Arc<ConditionTerms>,
-    /// Choices of the program where the scene leaves them open.
-    pub choices: Vec<Decision>,
     /// Results of the proof of the model.
     pub proof: Proof,
     /// Memory that the program held when sites and bonds were there.
     pub bytes: u64,
+}
+
+/// A run before its zones are laid out: the data that stay when they change.
+pub(crate) struct RunSetup {
+    /// The title of the scene.
+    pub title: String,
+    /// Coupling of its bodies.
+    pub traits: CouplingTraits,
+    /// Change of the scene that helps where a mode may grow.
+    pub remedy: &'static str,
+    /// Choices of the program where the scene leaves them open.
+    pub choices: Vec<Decision>,
     /// Seconds of each stage so far.
     pub timings: Timings,
     /// The clock of the stages.
     pub watch: Stopwatch,
 }
 
-/// A run before its zones are laid out: the data that stay when they change.
-pub(crate) struct RunSetup {
-    pub title: String,
-    pub traits: CouplingTraits,
-    pub remedy: &'static str,
-    pub choices: Vec<Decision>,
-    pub timings: Timings,
-    pub watch: Stopwatch,
+impl RunSetup {
+    /// Adds the seconds since the last lap to a stage.
+    pub fn lap(&mut self, stage: &str) {
+        self.watch.lap(&mut self.timings, stage);
+    }
 }
 
 /// Takes a scene apart.
@@ -89,25 +96,17 @@ pub(crate) fn begun<const D: usize>(scene: Scene<D>) -> (RunSetup, Problem<D>, R
 
 /// Lays a problem out and hands it on, and gives it back afterwards.
 pub(crate) fn lay_out<const D: usize, T>(
-    begun: RunSetup,
+    mut run: RunSetup,
     problem: Problem<D>,
     rest: &RunSettings<D>,
     start: LayoutStart<'_, D>,
     progress: &dyn Progress,
     then: impl FnOnce(ModelSetup<'_, D>) -> Result<T, RunError>,
 ) -> Result<(T, Problem<D>), RunError> {
-    let RunSetup {
-        title,
-        traits,
-        remedy,
-        mut choices,
-        mut timings,
-        mut watch,
-    } = begun;
     let holders = (start.ranks).filter(|_| start.sharing == Sharing::Families);
     let (model, coupling) = setup::shared_model(problem, rest, holders, progress)?;
-    choices.extend(setup::model_choices(&model));
-    watch.lap(&mut timings, "sites and bonds");
+    run.choices.extend(setup::model_choices(&model));
+    run.lap("sites and bonds");
     let bytes = resident_memory_bytes().unwrap_or(0);
     let operator = coupling.operator(&model)?;
     let terms = Arc::new(ConditionTerms::new(&model, &rest.conditions)?);
@@ -117,13 +116,13 @@ pub(crate) fn lay_out<const D: usize, T>(
         &operator,
         rest,
         start,
-        &mut choices,
+        &mut run.choices,
         progress,
     )?;
-    choices.extend(without_balance(&model, rest, moving.is_linear));
+    (run.choices).extend(without_balance(&model, rest, moving.is_linear));
     let of = (start.ranks, moving.system.as_ref());
     let proved = growth::proved(&model, &operator, of, progress);
-    watch.lap(&mut timings, "rows and bonds");
+    run.lap("rows and bonds");
     let proof = proof::prove(
         &Subject {
             model: &model,
@@ -138,25 +137,20 @@ pub(crate) fn lay_out<const D: usize, T>(
         progress,
     )?;
     proof::hold(&proof)?;
-    watch.lap(&mut timings, "proof");
+    run.lap("proof");
     if !terms.is_empty() {
         moving.system = Box::new(WithTerms::new(moving.system, terms.all()));
     }
     let done = then(ModelSetup {
-        title,
-        traits,
-        remedy,
+        setup: run,
         proved,
         model: &model,
         operator: &operator,
         rest,
         moving,
         terms: Arc::clone(&terms),
-        choices,
         proof,
         bytes,
-        timings,
-        watch,
     })?;
     drop(operator);
     Ok((
@@ -209,6 +203,34 @@ pub(crate) fn opened<const D: usize>(
     let step = saved.as_ref().map_or(u64::MAX, |saved| saved.state.step);
     setup::same_everywhere(rest, step, options.ranks)?;
     Ok((file, saved))
+}
+
+/// The files of a run, from its beginning or cut back to what was `written` at a checkpoint; the interval between checkpoints is that of the options, or else the one that the scene types.
+///
+/// # Errors
+/// [`ObserveError`] for files that cannot be made or cut.
+pub(crate) fn recorder<'a, const D: usize>(
+    (model, rest): (&Model<D>, &'a RunSettings<D>),
+    (options, typed): (RunOptions<'a>, Option<Pace>),
+    (impact, breaks, is_linear): (Option<Arc<Impact<D>>>, Breaks, bool),
+    file: CheckpointFile,
+    written: Option<&Written>,
+) -> Result<Recorder<'a, D>, ObserveError> {
+    let peaks = written.map(|written| &written.peaks[..]);
+    Recorder::new(
+        &rest.output,
+        &rest.conditions,
+        &Sampler::new(model),
+        impact.map(|impact| ImpactRecord::new(impact, &rest.impactors, peaks)),
+        breaks,
+        is_linear,
+        file,
+        RunOptions {
+            checkpoint_every: options.checkpoint_every.or(typed),
+            ..options
+        },
+        written,
+    )
 }
 
 /// Puts the damage of a checkpoint back.

@@ -2,11 +2,11 @@
 
 use super::RunOptions;
 use crate::coupling::Problem;
-use crate::peridynamics::bond_force::BondKinematics;
+use crate::peridynamics::bond_force::{BondKinematics, Storage};
 use crate::peridynamics::failure::Fracture;
 use crate::run::setup::RunSettings;
 use crate::scene::solve::Explicit;
-use crate::scene::spec::{ElementsSpec, PrecisionSpec};
+use crate::scene::spec::ElementsSpec;
 use crate::system::{Ranks, all_say};
 
 /// Parts of a run in time that each process has to itself, where the system lets it.
@@ -30,7 +30,7 @@ fn families_of_all<const D: usize>(problem: &Problem<D>, rest: &RunSettings<D>) 
         && rest.follow.is_none()
         && rest.breaking.contact.is_none()
         // lists hold the bonds of all points
-        && rest.breaking.precision == PrecisionSpec::Double
+        && rest.breaking.precision == Storage::Double
         && !rest.stresses.asks_for_more()
         && !rest.output.fields.has_others();
     let coupling = problem.coupling.as_ref();

@@ -4,11 +4,10 @@
 
 use std::sync::Arc;
 
-use crate::observe::summary::Reaction;
+use crate::observe::summary::ConditionForce;
 use crate::run::condition_terms::ConditionTerms;
 use crate::scene::conditions::{Condition, Prescribed};
-
-const AXES: [&str; 3] = ["x", "y", "z"];
+use crate::tensor::AXES;
 
 /// The conditions that hold something, with the dofs that each holds.
 pub(super) struct Supports<const D: usize> {
@@ -20,7 +19,7 @@ pub(super) struct Supports<const D: usize> {
     /// The springs themselves; none before the model is known.
     terms: Option<Arc<ConditionTerms>>,
     /// Forces of the springs at the last row.
-    last_of_terms: Vec<Reaction>,
+    last_of_terms: Vec<ConditionForce>,
     /// Forces of the last row, `D` of each condition; empty before the first.
     last: Vec<f64>,
 }
@@ -140,10 +139,10 @@ impl<const D: usize> Supports<D> {
     }
 
     /// The forces of the last row; none where this program wrote no row.
-    pub fn reactions(&self) -> Vec<Reaction> {
+    pub fn reactions(&self) -> Vec<ConditionForce> {
         let forces = self.last.chunks_exact(D);
         let all = self.conditions.iter().zip(forces);
-        all.map(|(support, force)| Reaction {
+        all.map(|(support, force)| ConditionForce {
             condition: support.name.clone(),
             force: force.to_vec(),
         })

@@ -3,21 +3,18 @@
 use super::RunOptions;
 use super::tips::farthest;
 use crate::observe::ObserveError;
-use crate::observe::csv::Entry;
-use crate::observe::history::History;
+use crate::observe::csv::{CsvTable, Entry};
 use crate::run::solution::Solved;
 use crate::run::solution_samples::{SampledSolution, table_header};
 use crate::scene::validated::Output;
 use crate::solve::explicit::State;
 use crate::system::SemiDiscrete;
-use crate::tensor::Vector;
-
-const AXES: [&str; 3] = ["x", "y", "z"];
+use crate::tensor::{AXES, Vector};
 
 /// The tables of a scene's tips and lines, in the order in which it names them.
 pub(super) struct Tables {
-    tips: Vec<History>,
-    lines: Vec<History>,
+    tips: Vec<CsvTable>,
+    lines: Vec<CsvTable>,
 }
 
 impl Tables {
@@ -27,7 +24,7 @@ impl Tables {
     /// Those of `open`.
     pub fn new<const D: usize>(
         output: &Output<D>,
-        open: impl Fn(&str, Vec<String>, usize) -> Result<History, ObserveError>,
+        open: impl Fn(&str, Vec<String>, usize) -> Result<CsvTable, ObserveError>,
     ) -> Result<Self, ObserveError> {
         let when = || ["step", "time"].map(str::to_owned).into_iter();
         let of_tip = AXES[..D].iter().chain(&["damage"]).map(|&h| h.to_owned());
@@ -44,7 +41,7 @@ impl Tables {
     }
 
     /// All tables.
-    pub fn iter(&self) -> impl Iterator<Item = &History> {
+    pub fn iter(&self) -> impl Iterator<Item = &CsvTable> {
         self.tips.iter().chain(&self.lines)
     }
 
@@ -64,7 +61,7 @@ impl Tables {
             return Ok(());
         }
         if options.writes() {
-            self.tips.iter_mut().try_for_each(History::begin)?;
+            self.tips.iter_mut().try_for_each(CsvTable::begin)?;
         }
         let body = system.body_state().filter(|_| may_be_damaged);
         let Some(damage) = body.and_then(|body| body.damage()) else {

@@ -16,11 +16,10 @@ use super::tables::Tables;
 use crate::model::{Model, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::{CheckpointFile, Pace};
-use crate::observe::csv::Entry;
-use crate::observe::history::History;
+use crate::observe::csv::{CsvTable, Entry};
 use crate::observe::pieces::agreed;
 use crate::observe::series::Series;
-use crate::observe::summary::{Reaction, SectionForce};
+use crate::observe::summary::{ConditionForce, SectionForce};
 use crate::run::condition_terms::ConditionTerms;
 use crate::run::error::RunError;
 use crate::run::field_probes;
@@ -33,9 +32,7 @@ use crate::scene::conditions::Condition;
 use crate::scene::validated::Output;
 use crate::solve::explicit::{Explicit, State};
 use crate::system::SemiDiscrete;
-use crate::tensor::Vector;
-
-const AXES: [&str; 3] = ["x", "y", "z"];
+use crate::tensor::{AXES, Vector};
 
 /// A state to be written.
 pub struct Moment<'a> {
@@ -119,7 +116,7 @@ pub struct Recorder<'a, const D: usize> {
     /// Record of impactors, if there are any.
     pub impact: Option<ImpactRecord<D>>,
     breaks: Breaks,
-    history: History,
+    history: CsvTable,
     tables: Tables,
     series: Series,
     checkpoint: CheckpointFile,
@@ -211,7 +208,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
     }
 
     /// The forces of the conditions that hold, at the last row.
-    pub fn reactions(&self) -> Vec<Reaction> {
+    pub fn reactions(&self) -> Vec<ConditionForce> {
         self.supports.reactions()
     }
 
@@ -467,12 +464,12 @@ fn files_begun<const D: usize>(
     checkpoint: &CheckpointFile,
     options: &RunOptions<'_>,
     written: Option<&Written>,
-) -> Result<(History, Tables, Series), ObserveError> {
+) -> Result<(CsvTable, Tables, Series), ObserveError> {
     let bytes = |file: usize| written.map_or(0, |w| w.bytes.get(file).copied().unwrap_or(0));
     let path = |end: &str| output.directory.join(format!("{}_{end}.csv", output.name));
     let table = |name: &str, header, file| match options.writes() {
-        true => History::resumed(&path(name), header, bytes(file)),
-        false => Ok(History::unwritten(header)),
+        true => CsvTable::resumed(&path(name), header, bytes(file)),
+        false => Ok(CsvTable::unwritten(header)),
     };
     let history = table("history", header, 0)?;
     let tables = Tables::new(output, |name, header, place| table(name, header, place + 1))?;

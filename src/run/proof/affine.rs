@@ -6,11 +6,11 @@ use super::loads::centre;
 use super::patch::{Around, PatchField, StressError, stress_errors};
 use super::surface::{self, Boundary, FacetKind, add_tractions};
 use crate::observe::proof::Part;
+use crate::peridynamics::bond_force::Storage;
 use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::run::loads::holders;
 use crate::scene::conditions::{Condition, Support};
-use crate::scene::spec::PrecisionSpec;
 use crate::system::{BlockCsr, Spread};
 use crate::tensor::{Tensor, Tensor4, Vector};
 use crate::{assembly::Row, parallel};
@@ -85,7 +85,7 @@ pub(super) fn part<const D: usize>(
     };
     // weights in four bytes are off by as much
     let exact = match (proved.system, proved.rest.breaking.precision) {
-        (Some(_), PrecisionSpec::Single) => limits::EXACT.max(100.0 * f64::from(f32::EPSILON)),
+        (Some(_), Storage::Single) => limits::EXACT.max(100.0 * f64::from(f32::EPSILON)),
         _ => limits::EXACT,
     };
     Ok(Some(prove(&subject, exact, proved.product)))

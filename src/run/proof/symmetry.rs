@@ -3,7 +3,7 @@
 use super::Subject;
 use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::observe::report::number;
-use crate::scene::spec::PrecisionSpec;
+use crate::peridynamics::bond_force::Storage;
 use crate::system::Symmetry;
 
 /// Relative asymmetry that round-off leaves.
@@ -35,7 +35,7 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Option<Part> {
         0.0
     };
     let limit = match (subject.system, subject.rest.breaking.precision) {
-        (Some(_), PrecisionSpec::Single) => 100.0 * f64::from(f32::EPSILON),
+        (Some(_), Storage::Single) => 100.0 * f64::from(f32::EPSILON),
         _ => ROUND_OFF * (dofs as f64).sqrt(),
     };
     let broken = (asymmetry.is_nan() || asymmetry > limit).then(|| Finding {

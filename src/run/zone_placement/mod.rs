@@ -61,12 +61,9 @@ struct Options {
 /// Refuses cells of second order: the error of a solution is judged by the gradients that linear cells have.
 fn refuse_second_order<const D: usize>(mesh: &Mesh<D>, span: &Span) -> Result<(), SceneError> {
     match mesh.shapes.iter().find(|shape| shape.is_quadratic()) {
-        Some(shape) => Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`zones.auto` judges the solution of linear cells, and the mesh has {shape:?}"),
-        )
-        .label(span.clone(), "linear cells only")
-        .help("draw the zone: [zones.nonlocal]; or take linear cells: mesh.file.order = \"linear\", or another `cell` of a generated mesh")),
+        Some(shape) => Err(SceneError::conflict(format!("`zones.auto` judges the solution of linear cells, and the mesh has {shape:?}"))
+            .label(span.clone(), "linear cells only")
+            .help("draw the zone: [zones.nonlocal]; or take linear cells: mesh.file.order = \"linear\", or another `cell` of a generated mesh")),
         None => Ok(()),
     }
 }
@@ -89,12 +86,9 @@ pub(crate) fn placed<const D: usize>(scene: &Draft<'_, D>) -> Result<Option<Foun
     alone(spec, &span)?;
     refuse_second_order(mesh, &span)?;
     let Some(p) = &spec.peridynamics else {
-        return Err(SceneError::new(
-            SceneErrorKind::Missing,
-            "`zones.auto` needs [peridynamics]",
-        )
-        .label(span, "which horizon?")
-        .help("add [peridynamics] with horizon = ... and points = ..., or remove it: without zones all is finite elements"));
+        return Err(SceneError::missing("`zones.auto` needs [peridynamics]")
+            .label(span, "which horizon?")
+            .help("add [peridynamics] with horizon = ... and points = ..., or remove it: without zones all is finite elements"));
     };
     let options = options(auto.get_ref())?;
     let start = Instant::now();
@@ -108,14 +102,11 @@ pub(crate) fn placed<const D: usize>(scene: &Draft<'_, D>) -> Result<Option<Foun
         .collect();
     if let Some(c) = (0..mesh.cell_count()).find(|&c| !(horizon[c].is_finite() && horizon[c] > 0.0))
     {
-        return Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!(
-                "`peridynamics.horizon` is {} at {:?}",
-                horizon[c],
-                mesh.centroid(c).as_slice()
-            ),
-        )
+        return Err(SceneError::wrong_value(format!(
+            "`peridynamics.horizon` is {} at {:?}",
+            horizon[c],
+            mesh.centroid(c).as_slice()
+        ))
         .label(
             p.horizon.as_ref().map_or(span, |h| h.span.clone()),
             "`zones.auto` looks everywhere",
@@ -303,13 +294,10 @@ fn alone(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
         (None, Some(name)) => (format!("zones.bodies.{name}"), name.span.clone()),
         (None, None) => return Ok(()),
     };
-    Err(SceneError::new(
-        SceneErrorKind::Conflict,
-        format!(
-            "`zones.auto` and `{}` both say where the body is nonlocal",
-            drawn.0
-        ),
-    )
+    Err(SceneError::conflict(format!(
+        "`zones.auto` and `{}` both say where the body is nonlocal",
+        drawn.0
+    ))
     .label(span.clone(), "places the zone")
     .label(drawn.1, "draws it")
     .help("keep one of them; `--set zones=auto` replaces all of [zones]"))
@@ -329,14 +317,11 @@ fn refuse_damage<const D: usize>(material: &Material<D>, span: &Span) -> Result<
         }
         _ => return Ok(()),
     };
-    Err(SceneError::new(
-        SceneErrorKind::Conflict,
-        format!(
-            "`zones.auto` looks for bonds that reach a critical stretch, and the law of the material `{}`, {}, {does}",
-            material.name,
-            material.law.name()
-        ),
-    )
+    Err(SceneError::conflict(format!(
+        "`zones.auto` looks for bonds that reach a critical stretch, and the law of the material `{}`, {}, {does}",
+        material.name,
+        material.law.name()
+    ))
     .label(span.clone(), "cannot tell where damage begins")
     .help("draw the zone, [zones.nonlocal], with room for the damage, or use coupling = \"nonlocal\""))
 }

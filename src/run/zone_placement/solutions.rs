@@ -9,7 +9,7 @@ use crate::run::error::RunError;
 use crate::run::setup;
 use crate::scene::conditions::Condition;
 use crate::scene::draft::Draft;
-use crate::scene::error::{SceneError, SceneErrorKind};
+use crate::scene::error::SceneError;
 use crate::scene::initial::InitialKind;
 use crate::scene::materials::Material;
 use crate::scene::solve::Solve;
@@ -104,10 +104,9 @@ pub(super) fn coupled<const D: usize>(
 }
 
 fn unsolved(error: &RunError, how: &str, span: &Span) -> SceneError {
-    SceneError::new(
-        SceneErrorKind::Conflict,
-        format!("`zones.auto` could not solve the scene {how}: {error}"),
-    )
+    SceneError::conflict(format!(
+        "`zones.auto` could not solve the scene {how}: {error}"
+    ))
     .label(span.clone(), "needs that solution")
 }
 

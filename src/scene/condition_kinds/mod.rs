@@ -24,6 +24,7 @@ mod velocity;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::condition_at::ConditionAt;
 use super::conditions::Condition;
 use super::error::SceneError;
 use super::solve::Clock;
@@ -41,17 +42,11 @@ pub use velocity::VelocitySpec;
 
 /// A kind of condition, as scenes type it.
 pub(crate) trait ConditionKind {
-    /// The condition on a mesh; `place` is that of its table, `name` its own.
+    /// The condition where a scene names it.
     ///
     /// # Errors
     /// [`SceneError`] for a set, a shape or values that make no condition.
-    fn build<const D: usize>(
-        &self,
-        place: &str,
-        name: &Text,
-        mesh: &Mesh<D>,
-        clock: Clock,
-    ) -> Result<Condition<D>, SceneError>;
+    fn build<const D: usize>(&self, at: &ConditionAt<'_, D>) -> Result<Condition<D>, SceneError>;
 }
 
 /// Declares [`ConditionSpec`], the conditions by their keys.
@@ -79,7 +74,8 @@ macro_rules! conditions {
             ) -> Result<Condition<D>, SceneError> {
                 match self {
                     $(Self::$kind(kind) => {
-                        kind.build(&format!("conditions.{name}.{}", $key), name, mesh, clock)
+                        let place = format!("conditions.{name}.{}", $key);
+                        kind.build(&ConditionAt { place: &place, name, mesh, clock })
                     })*
                 }
             }

@@ -4,15 +4,13 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::ConditionKind;
-use crate::mesh::Mesh;
 use crate::scene::bounds_checks;
-use crate::scene::components::{Components, finite};
+use crate::scene::components::Components;
+use crate::scene::condition_at::ConditionAt;
 use crate::scene::conditions::{Condition, Prescribed};
 use crate::scene::error::SceneError;
 use crate::scene::expression::Expression;
 use crate::scene::load::{Domain, Load};
-use crate::scene::places::outer_facets;
-use crate::scene::solve::Clock;
 use crate::scene::value::Text;
 
 /// A pressure on a set of facets at the boundary of the body.
@@ -28,30 +26,20 @@ pub struct PressureSpec {
 }
 
 impl ConditionKind for PressureSpec {
-    fn build<const D: usize>(
-        &self,
-        place: &str,
-        name: &Text,
-        mesh: &Mesh<D>,
-        clock: Clock,
-    ) -> Result<Condition<D>, SceneError> {
-        let at = format!("{place}.value");
-        bounds_checks::no_further_axes::<D>(&at, &self.value)?;
-        clock.admits(&at, &self.value)?;
-        let facets = outer_facets(place, &self.on, mesh)?;
+    fn build<const D: usize>(&self, at: &ConditionAt<'_, D>) -> Result<Condition<D>, SceneError> {
+        let place = format!("{}.value", at.place);
+        bounds_checks::no_further_axes::<D>(&place, &self.value)?;
+        at.clock.admits(&place, &self.value)?;
+        let facets = at.outer_facets(&self.on)?;
         let components = Components::only(0, self.value.clone());
         let nodes = facets.iter().flat_map(|f| f.nodes.iter());
-        let nodes = nodes.map(|&n| mesh.nodes[n as usize]);
-        finite(place, name, &components, clock, nodes)?;
+        let nodes = nodes.map(|&n| at.mesh.nodes[n as usize]);
+        at.finite(&components, nodes)?;
         let load = Load {
             on: Domain::Surface(facets),
             // p is the first component
             density: |p, n| n * -p[0],
         };
-        Ok(Condition {
-            name: name.value.clone(),
-            prescribed: Prescribed::Load(load),
-            components,
-        })
+        Ok(at.prescribes(Prescribed::Load(load), components))
     }
 }

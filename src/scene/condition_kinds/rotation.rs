@@ -4,76 +4,58 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::ConditionKind;
-use crate::mesh::Mesh;
-use crate::scene::components::{Components, finite};
+use crate::scene::components::Components;
+use crate::scene::condition_at::ConditionAt;
 use crate::scene::conditions::{Condition, Prescribed};
-use crate::scene::error::{SceneError, SceneErrorKind};
+use crate::scene::error::SceneError;
 use crate::scene::expression::Expression;
-use crate::scene::places::support;
 use crate::scene::region::position;
-use crate::scene::solve::Clock;
 use crate::scene::spec::ShapeSpec;
 use crate::scene::value::{Coordinates, Text};
-use crate::tensor::{Tensor, Vector};
-
-const AXES: [&str; 3] = ["x", "y", "z"];
+use crate::tensor::{AXES, Tensor, Vector};
 
 /// A rigid rotation: exactly one of `on` and `inside`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RotationSpec {
     /// A named set of the mesh.
-    #[serde(default)]
     pub on: Option<Text>,
     /// All sites inside a shape.
-    #[serde(default)]
     pub inside: Option<ShapeSpec>,
     /// A point of the axis.
     pub center: Coordinates,
     /// Direction of the axis in 3D, of any length; in a plane the axis is z.
-    #[serde(default)]
     pub axis: Option<Coordinates>,
     /// Angle in degrees, right-handed about the axis (counter-clockwise in a plane); may depend on the time.
     pub angle: Expression,
 }
 
 impl ConditionKind for RotationSpec {
-    fn build<const D: usize>(
-        &self,
-        place: &str,
-        name: &Text,
-        mesh: &Mesh<D>,
-        clock: Clock,
-    ) -> Result<Condition<D>, SceneError> {
+    fn build<const D: usize>(&self, at: &ConditionAt<'_, D>) -> Result<Condition<D>, SceneError> {
+        let (place, name) = (at.place, at.name);
         if D == 1 {
-            return Err(SceneError::new(
-                SceneErrorKind::Dimension,
-                format!("`{place}` in a scene of dimension 1"),
-            )
-            .label(name.span.clone(), "a bar does not rotate")
-            .help("prescribe a displacement"));
+            return Err(
+                SceneError::dimension(format!("`{place}` in a scene of dimension 1"))
+                    .label(name.span.clone(), "a bar does not rotate")
+                    .help("prescribe a displacement"),
+            );
         }
-        let at = format!("{place}.angle");
-        clock.admits(&at, &self.angle)?;
+        let angle = format!("{place}.angle");
+        at.clock.admits(&angle, &self.angle)?;
         if self.angle.depends_on_position() {
-            return Err(SceneError::new(
-                SceneErrorKind::Conflict,
-                format!("`{at}` depends on position"),
-            )
-            .label(self.angle.span.clone(), "not a rigid rotation")
-            .help("let the angle be a number or depend on t only"));
+            return Err(
+                SceneError::conflict(format!("`{angle}` depends on position"))
+                    .label(self.angle.span.clone(), "not a rigid rotation")
+                    .help("let the angle be a number or depend on t only"),
+            );
         }
         let centre = position::<D>(&format!("{place}.center"), &self.center)?;
         let axis = axis::<D>(place, name, self)?;
         let components = rotated(&axis, &centre, &self.angle);
-        let support = support(place, name, self.on.as_ref(), self.inside.as_ref(), mesh)?;
-        let nodes = mesh.nodes.iter().copied().take(1);
-        finite(place, name, &components, clock, nodes)?;
-        Ok(Condition {
-            name: name.value.clone(),
-            prescribed: Prescribed::Displacement(support),
-            components,
-        })
+        let support = at.support(self.on.as_ref(), self.inside.as_ref())?;
+        let nodes = at.mesh.nodes.iter().copied().take(1);
+        at.finite(&components, nodes)?;
+        Ok(at.prescribes(Prescribed::Displacement(support), components))
     }
 }
 
@@ -86,20 +68,16 @@ fn axis<const D: usize>(
     let k = match (&spec.axis, D) {
         (None, 2) => [0.0, 0.0, 1.0],
         (Some(typed), 2) => {
-            return Err(SceneError::new(
-                SceneErrorKind::Dimension,
-                format!("`{place}.axis` in a scene of dimension 2"),
-            )
-            .label(typed.span.clone(), "the axis of a plane is z")
-            .help("remove `axis`"));
+            return Err(
+                SceneError::dimension(format!("`{place}.axis` in a scene of dimension 2"))
+                    .label(typed.span.clone(), "the axis of a plane is z")
+                    .help("remove `axis`"),
+            );
         }
         (None, _) => {
-            return Err(SceneError::new(
-                SceneErrorKind::Missing,
-                format!("`{place}` has no `axis`"),
-            )
-            .label(name.span.clone(), "about which axis?")
-            .help("add axis = [0, 0, 1]"));
+            return Err(SceneError::missing(format!("`{place}` has no `axis`"))
+                .label(name.span.clone(), "about which axis?")
+                .help("add axis = [0, 0, 1]"));
         }
         (Some(typed), _) => {
             let k = position::<D>(&format!("{place}.axis"), typed)?;
@@ -109,10 +87,9 @@ fn axis<const D: usize>(
             {
                 Some(k) => std::array::from_fn(|i| k[i]),
                 None => {
-                    return Err(SceneError::new(
-                        SceneErrorKind::WrongValue,
-                        format!("`{place}.axis` has no direction"),
-                    )
+                    return Err(SceneError::wrong_value(format!(
+                        "`{place}.axis` has no direction"
+                    ))
                     .label(typed.span.clone(), "zero")
                     .help("write a direction such as [0, 0, 1]"));
                 }

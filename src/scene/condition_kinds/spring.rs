@@ -11,77 +11,55 @@ use serde::Deserialize;
 
 use super::ConditionKind;
 use crate::fem;
+use crate::mesh::Facet;
 use crate::mesh::boundary::BoundaryFacet;
-use crate::mesh::{Facet, Mesh};
 use crate::model::loaded_places::split_facets;
 use crate::model::tributary::{Detail, Parts};
 use crate::model::{CellRole, Model};
 use crate::scene::bounds_checks;
-use crate::scene::components::Components;
+use crate::scene::components::{Components, no_such_axis};
+use crate::scene::condition_at::ConditionAt;
 use crate::scene::conditions::{Condition, ConditionTerm, Prescribed};
-use crate::scene::error::{SceneError, SceneErrorKind};
-use crate::scene::places::{facet_set, inside, outer_facets};
+use crate::scene::error::SceneError;
 use crate::scene::region::Region;
-use crate::scene::solve::Clock;
 use crate::scene::spec::ShapeSpec;
 use crate::scene::value::{Number, Text};
 use crate::system::{ForceTerm, SpringRows};
-use crate::tensor::{Tensor, Vector};
-
-const AXES: [&str; 3] = ["x", "y", "z"];
+use crate::tensor::{AXES, Tensor, Vector};
 
 /// Springs to the ground: exactly one of `on` and `inside`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct SpringSpec {
     /// A named set of facets of the mesh; stiffnesses are forces per area and displacement.
-    #[serde(default)]
     pub on: Option<Text>,
     /// The cells of the mesh with their centroid in a shape; stiffnesses are forces per volume and displacement.
-    #[serde(default)]
     pub inside: Option<ShapeSpec>,
     /// Stiffness along x.
-    #[serde(default)]
     pub x: Option<Number>,
     /// Stiffness along y.
-    #[serde(default)]
     pub y: Option<Number>,
     /// Stiffness along z.
-    #[serde(default)]
     pub z: Option<Number>,
     /// Stiffness along the normal of the set, instead of components.
-    #[serde(default)]
     pub normal: Option<Number>,
 }
 
 impl ConditionKind for SpringSpec {
-    fn build<const D: usize>(
-        &self,
-        place: &str,
-        name: &Text,
-        mesh: &Mesh<D>,
-        _clock: Clock,
-    ) -> Result<Condition<D>, SceneError> {
+    fn build<const D: usize>(&self, at: &ConditionAt<'_, D>) -> Result<Condition<D>, SceneError> {
+        let place = at.place;
         let given = [&self.x, &self.y, &self.z];
         let choice = |what: &str, help: &str| {
-            Err(
-                SceneError::new(SceneErrorKind::Choice, format!("`{place}` has {what}"))
-                    .label(name.span.clone(), "springs")
-                    .help(help),
-            )
+            Err(SceneError::choice(format!("`{place}` has {what}"))
+                .label(at.name.span.clone(), "springs")
+                .help(help))
         };
         let mut stiffness = Vector::<D>::zeros();
         for (k, number) in given.iter().enumerate() {
             let Some(number) = number else { continue };
-            let at = format!("{place}.{}", AXES[k]);
-            let value = bounds_checks::positive(&at, number)?;
+            let value = bounds_checks::positive(&format!("{place}.{}", AXES[k]), number)?;
             if k >= D {
-                return Err(SceneError::new(
-                    SceneErrorKind::Dimension,
-                    format!("`{at}` in a scene of dimension {D}"),
-                )
-                .label(number.span.clone(), "no such axis")
-                .help(format!("remove `{}`", AXES[k])));
+                return Err(no_such_axis::<D>(place, k, &number.span));
             }
             stiffness[k] = value;
         }
@@ -109,23 +87,20 @@ impl ConditionKind for SpringSpec {
                 return choice("no stiffness", "add x = ..., or normal = ...");
             }
             (Some(on), None, Some(normal)) => Bedding::Normal {
-                facets: outer_facets(place, on, mesh)?,
+                facets: at.outer_facets(on)?,
                 stiffness: bounds_checks::positive(&format!("{place}.normal"), normal)?,
             },
             (Some(on), None, None) => Bedding::Axes {
-                facets: facet_set(place, on, mesh)?.to_vec(),
+                facets: at.facet_set(on)?.to_vec(),
                 stiffness,
             },
             (None, Some(shape), None) => Bedding::Inside {
-                region: inside(place, name, shape, mesh)?,
+                region: at.inside(shape)?,
                 stiffness,
             },
         };
-        Ok(Condition {
-            name: name.value.clone(),
-            prescribed: Prescribed::Term(Arc::new(bedding)),
-            components: Components(std::array::from_fn(|_| None)),
-        })
+        let none = Components(std::array::from_fn(|_| None));
+        Ok(at.prescribes(Prescribed::Term(Arc::new(bedding)), none))
     }
 }
 

@@ -4,13 +4,11 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::ConditionKind;
-use crate::mesh::Mesh;
 use crate::scene::components::Components;
+use crate::scene::condition_at::ConditionAt;
 use crate::scene::conditions::{Condition, Prescribed};
-use crate::scene::error::{SceneError, SceneErrorKind};
+use crate::scene::error::SceneError;
 use crate::scene::expression::Expression;
-use crate::scene::places::support;
-use crate::scene::solve::Clock;
 use crate::scene::value::Text;
 
 /// A plane of symmetry along the axes.
@@ -22,35 +20,25 @@ pub struct SymmetrySpec {
 }
 
 impl ConditionKind for SymmetrySpec {
-    fn build<const D: usize>(
-        &self,
-        place: &str,
-        name: &Text,
-        mesh: &Mesh<D>,
-        _clock: Clock,
-    ) -> Result<Condition<D>, SceneError> {
-        let support = support(place, name, Some(&self.on), None, mesh)?;
+    fn build<const D: usize>(&self, at: &ConditionAt<'_, D>) -> Result<Condition<D>, SceneError> {
+        let (place, mesh) = (at.place, at.mesh);
+        let support = at.support(Some(&self.on), None)?;
         let nodes = mesh.nodes_of_set(&self.on.value).unwrap_or_default();
         let (low, high) = mesh.bounds();
         let tolerance = 1e-9 * (high - low).norm();
         let (from, to) = mesh.bounds_of(&nodes);
         let flat: Vec<usize> = (0..D).filter(|&k| to[k] - from[k] <= tolerance).collect();
         let refuse = |why: String, help: &str| {
-            Err(
-                SceneError::new(SceneErrorKind::Conflict, format!("`{place}.on`: {why}"))
-                    .label(self.on.span.clone(), "whose normal?")
-                    .help(help),
-            )
+            Err(SceneError::conflict(format!("`{place}.on`: {why}"))
+                .label(self.on.span.clone(), "whose normal?")
+                .help(help))
         };
         match flat[..] {
-            [axis] => Ok(Condition {
-                name: name.value.clone(),
-                prescribed: Prescribed::Displacement(support),
-                components: Components::only(
-                    axis,
-                    Expression::constant(0.0).at(self.on.span.clone()),
-                ),
-            }),
+            [axis] => {
+                let zero = Expression::constant(0.0).at(self.on.span.clone());
+                let components = Components::only(axis, zero);
+                Ok(at.prescribes(Prescribed::Displacement(support), components))
+            }
             [] => refuse(
                 format!(
                     "the set `{}` reaches from {:?} to {:?}: it is no plane x, y or z = constant",

@@ -4,12 +4,12 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{ConditionKind, displacement::held};
-use crate::mesh::Mesh;
-use crate::scene::components::{Components, components_in};
+use crate::scene::components::Components;
+use crate::scene::condition_at::ConditionAt;
 use crate::scene::conditions::{Condition, Prescribed};
-use crate::scene::error::{SceneError, SceneErrorKind};
+use crate::scene::error::SceneError;
 use crate::scene::expression::Expression;
-use crate::scene::solve::{Clock, Pacing};
+use crate::scene::solve::Pacing;
 use crate::scene::spec::ShapeSpec;
 use crate::scene::value::Text;
 
@@ -18,56 +18,38 @@ use crate::scene::value::Text;
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct VelocitySpec {
     /// A named set of the mesh. Where peridynamics meets the set, points within three quarters of their spacing of it follow it: the first layer.
-    #[serde(default)]
     pub on: Option<Text>,
     /// All sites inside a shape.
-    #[serde(default)]
     pub inside: Option<ShapeSpec>,
     /// Velocity along x.
-    #[serde(default)]
     pub x: Option<Expression>,
     /// Velocity along y.
-    #[serde(default)]
     pub y: Option<Expression>,
     /// Velocity along z.
-    #[serde(default)]
     pub z: Option<Expression>,
 }
 
 impl ConditionKind for VelocitySpec {
-    fn build<const D: usize>(
-        &self,
-        place: &str,
-        name: &Text,
-        mesh: &Mesh<D>,
-        clock: Clock,
-    ) -> Result<Condition<D>, SceneError> {
-        let components = components_in(place, name, [&self.x, &self.y, &self.z], clock)?;
-        moves(place, name, &components, clock)?;
-        let at = (self.on.as_ref(), self.inside.as_ref());
-        let support = held(place, name, at, &components, mesh, clock)?;
-        Ok(Condition {
-            name: name.value.clone(),
-            prescribed: Prescribed::Velocity(support),
-            components,
-        })
+    fn build<const D: usize>(&self, at: &ConditionAt<'_, D>) -> Result<Condition<D>, SceneError> {
+        let components = at.components([&self.x, &self.y, &self.z])?;
+        moves(at, &components)?;
+        let support = held(at, (self.on.as_ref(), self.inside.as_ref()), &components)?;
+        Ok(at.prescribes(Prescribed::Velocity(support), components))
     }
 }
 
 /// Checks that a velocity is one that a run can follow.
 fn moves<const D: usize>(
-    place: &str,
-    name: &Text,
+    at: &ConditionAt<'_, D>,
     components: &Components<D>,
-    clock: Clock,
 ) -> Result<(), SceneError> {
-    if clock.pacing != Pacing::Moving {
-        return Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`{place}` in a scene that does not move"),
-        )
-        .label(name.span.clone(), "a velocity")
-        .help("add [solve.explicit] with duration = ..., or prescribe a displacement"));
+    let place = at.place;
+    if at.clock.pacing != Pacing::Moving {
+        return Err(
+            SceneError::conflict(format!("`{place}` in a scene that does not move"))
+                .label(at.name.span.clone(), "a velocity")
+                .help("add [solve.explicit] with duration = ..., or prescribe a displacement"),
+        );
     }
     match components
         .0
@@ -76,11 +58,8 @@ fn moves<const D: usize>(
         .find(|e| e.depends_on_time() && e.depends_on_position())
     {
         None => Ok(()),
-        Some(e) => Err(SceneError::new(
-            SceneErrorKind::Conflict,
-            format!("`{place}` depends on time and on position"),
-        )
-        .label(e.span.clone(), "has no displacement in closed form")
-        .help("prescribe the displacement, its integral over t; or let the velocity depend on one of the two")),
+        Some(e) => Err(SceneError::conflict(format!("`{place}` depends on time and on position"))
+            .label(e.span.clone(), "has no displacement in closed form")
+            .help("prescribe the displacement, its integral over t; or let the velocity depend on one of the two")),
     }
 }

@@ -3,9 +3,9 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::blending::{BetaSpec, SMOOTH};
+use super::blending::SMOOTH;
 use super::{CouplingKind, CouplingTraits, LatticeStart, ZonesNeeded};
-use crate::coupling::{Balanced, Coupling};
+use crate::coupling::{Balanced, BlendingFunction, Coupling};
 use crate::peridynamics::LinearForceState;
 
 /// Half of a splice's forces and half of a blending's.
@@ -13,7 +13,7 @@ use crate::peridynamics::LinearForceState;
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct BalancedSpec {
     /// Shape of β over the transition zone; if left out, a step at the edge of the nonlocal zone.
-    pub beta: Option<BetaSpec>,
+    pub beta: Option<BlendingFunction>,
 }
 
 impl CouplingKind for BalancedSpec {
@@ -31,7 +31,7 @@ impl CouplingKind for BalancedSpec {
 
     fn build<const D: usize>(&self, _law: &dyn LinearForceState<D>) -> Box<dyn Coupling<D>> {
         Box::new(Balanced {
-            function: self.beta.map(BetaSpec::function),
+            function: self.beta,
         })
     }
 }

@@ -13,30 +13,7 @@ use crate::peridynamics::LinearForceState;
 pub struct BlendingSpec {
     /// Shape of β from 1 at the nonlocal zone to 0 at the local one.
     #[serde(default)]
-    pub beta: BetaSpec,
-}
-
-/// Shape of the blending function.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum BetaSpec {
-    /// One half throughout the transition zone.
-    Constant,
-    /// Straight.
-    Linear,
-    /// The cubic `3 s² - 2 s³`.
-    #[default]
-    Smooth,
-}
-
-impl BetaSpec {
-    pub(super) fn function(self) -> BlendingFunction {
-        match self {
-            Self::Constant => BlendingFunction::Constant,
-            Self::Linear => BlendingFunction::Linear,
-            Self::Smooth => BlendingFunction::Smooth,
-        }
-    }
+    pub beta: BlendingFunction,
 }
 
 /// A transition zone over which β falls smoothly.
@@ -52,11 +29,11 @@ impl CouplingKind for BlendingSpec {
             about: "forces are blended over the transition zone",
             zones: match self.beta {
                 // a step is a step, however wide; the report's slit plate has one horizon
-                BetaSpec::Constant => ZonesNeeded::Transition {
+                BlendingFunction::Constant => ZonesNeeded::Transition {
                     width: 1.0,
                     why: "families of the nonlocal zone then reach past it",
                 },
-                BetaSpec::Linear | BetaSpec::Smooth => SMOOTH,
+                BlendingFunction::Linear | BlendingFunction::Smooth => SMOOTH,
             },
             lattice: LatticeStart::OnCorner,
         }
@@ -64,7 +41,7 @@ impl CouplingKind for BlendingSpec {
 
     fn build<const D: usize>(&self, _law: &dyn LinearForceState<D>) -> Box<dyn Coupling<D>> {
         Box::new(Blending {
-            function: self.beta.function(),
+            function: self.beta,
         })
     }
 }

@@ -27,10 +27,10 @@ use crate::model::Zone;
 use crate::peridynamics::LinearForceState;
 
 pub use balanced::BalancedSpec;
-pub use blending::{BetaSpec, BlendingSpec};
-pub use partial_stress::{FormSpec, InterfaceSpec, PartialStressSpec};
+pub use blending::BlendingSpec;
+pub use partial_stress::{FormSpec, PartialStressSpec};
 pub use splice::SpliceSpec;
-pub use truncated::{CutBondsSpec, TruncatedSpec};
+pub use truncated::TruncatedSpec;
 pub use uncoupled::{LocalSpec, NonlocalSpec};
 
 /// A coupling, as scenes type it.

@@ -17,7 +17,7 @@ pub struct PartialStressSpec {
     pub form: FormSpec,
     /// Order of the least-squares constraint where mesh and points meet.
     #[serde(default)]
-    pub interface: InterfaceSpec,
+    pub interface: FitDegree,
 }
 
 /// Discretisation of the divergence of the partial stress.
@@ -29,17 +29,6 @@ pub enum FormSpec {
     Elements,
     /// Points, through the shape tensor (section 7.2).
     Meshfree,
-}
-
-/// Order of the constraint where mesh and points meet.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum InterfaceSpec {
-    /// Affine fields pass exactly.
-    Affine,
-    /// Quadratic fields pass exactly.
-    #[default]
-    Quadratic,
 }
 
 impl CouplingKind for PartialStressSpec {
@@ -58,10 +47,7 @@ impl CouplingKind for PartialStressSpec {
     fn build<const D: usize>(&self, law: &dyn LinearForceState<D>) -> Box<dyn Coupling<D>> {
         match self.form {
             FormSpec::Elements => Box::new(PartialStressElements {
-                fit: match self.interface {
-                    InterfaceSpec::Affine => FitDegree::Affine,
-                    InterfaceSpec::Quadratic => FitDegree::Quadratic,
-                },
+                fit: self.interface,
             }),
             FormSpec::Meshfree => Box::new(PartialStressMeshfree {
                 influence: law.divergence(),

@@ -13,19 +13,7 @@ use crate::peridynamics::LinearForceState;
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct TruncatedSpec {
     /// Treatment of cut bonds where bonds are exact or break; `breaking` if left out, `linear` beside a zone that follows its crack.
-    #[serde(default)]
-    pub cut_bonds: Option<CutBondsSpec>,
-}
-
-/// Treatment of bonds that the seam cuts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum CutBondsSpec {
-    /// They turn, stretch and break like others.
-    #[default]
-    Breaking,
-    /// They are linear and do not break: cheaper, where damage stays two horizons away from the seam.
-    Linear,
+    pub cut_bonds: Option<CutBonds>,
 }
 
 impl CouplingKind for TruncatedSpec {
@@ -43,10 +31,7 @@ impl CouplingKind for TruncatedSpec {
             return Box::new(TruncatedFamilies);
         }
         Box::new(Truncated {
-            cut_bonds: match self.cut_bonds.unwrap_or_default() {
-                CutBondsSpec::Breaking => CutBonds::Breaking,
-                CutBondsSpec::Linear => CutBonds::Linear,
-            },
+            cut_bonds: self.cut_bonds.unwrap_or_default(),
         })
     }
 }

@@ -14,7 +14,6 @@ pub struct TemperatureSpec {
     /// Temperature in x, y, z and, in scenes in time, t.
     pub value: Expression,
     /// Temperature without thermal strain; 0 if left out.
-    #[serde(default)]
     pub reference: Option<Number>,
 }
 

@@ -20,10 +20,8 @@ pub struct SolverSpec {
     #[serde(default)]
     pub method: Method,
     /// Relative residual at which the iteration stops; 1e-10 if left out.
-    #[serde(default)]
     pub tolerance: Option<Number>,
     /// Most iterations; 500 if left out.
-    #[serde(default)]
     pub max_iterations: Option<Count>,
     /// Elimination order of the direct solver.
     #[serde(default)]
@@ -49,10 +47,8 @@ pub enum UnprovenSpec {
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct OutputSpec {
     /// Folder for all files, relative to where the command runs; "out" if left out.
-    #[serde(default)]
     pub directory: Option<Text>,
     /// Beginning of all file names; the scene's file name if left out.
-    #[serde(default)]
     pub name: Option<Text>,
     /// True if a VTU file is written; true if left out.
     #[serde(default)]
@@ -147,9 +143,7 @@ pub struct SectionSpec {
     /// Normal of the plane, of any length; it points to the part whose force on the rest is reported.
     pub normal: Coordinates,
     /// A shape that holds that part beyond the plane; all beyond the plane if left out.
-    #[serde(default)]
     pub inside: Option<ShapeSpec>,
     /// The point about which the moment is taken; `point` if left out.
-    #[serde(default)]
     pub about: Option<Coordinates>,
 }

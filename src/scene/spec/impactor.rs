@@ -11,25 +11,18 @@ use crate::scene::value::{Coordinates, Number};
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ImpactorSpec {
     /// A sphere; a disc in 2D.
-    #[serde(default)]
     pub sphere: Option<SphereSpec>,
     /// A cylinder without ends, in 3D.
-    #[serde(default)]
     pub cylinder: Option<CylinderSpec>,
     /// The half space behind a plane.
-    #[serde(default)]
     pub plane: Option<PlaneSpec>,
     /// Mass of an impactor that moves freely (per thickness in 2D, per section in 1D); without it its motion is prescribed.
-    #[serde(default)]
     pub mass: Option<Number>,
     /// Velocity: at time zero of one with a mass, else prescribed, as numbers or expressions in t.
-    #[serde(default)]
     pub velocity: Option<ImpactorMotionSpec>,
     /// Prescribed way from its place, in t.
-    #[serde(default)]
     pub displacement: Option<ImpactorMotionSpec>,
     /// Factor of the penalty stiffness; 0.5 in motion and 10 in load steps if left out.
-    #[serde(default)]
     pub stiffness_factor: Option<Number>,
 }
 
@@ -70,12 +63,9 @@ pub struct PlaneSpec {
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ImpactorMotionSpec {
     /// Component along x.
-    #[serde(default)]
     pub x: Option<Expression>,
     /// Component along y.
-    #[serde(default)]
     pub y: Option<Expression>,
     /// Component along z.
-    #[serde(default)]
     pub z: Option<Expression>,
 }

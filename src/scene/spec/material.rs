@@ -11,8 +11,11 @@ use serde::de::{self, DeserializeSeed, Deserializer, EnumAccess, VariantAccess, 
 use super::influence::InfluenceSpec;
 use super::named_law::{self, NamedSpec};
 use super::user_material::UmatSpec;
+use crate::model::Surfaces;
+use crate::peridynamics::bond_force::{BondKinematics, Storage};
 use crate::peridynamics::failure::{self, FailureCriterion};
 use crate::peridynamics::laws::Named;
+use crate::peridynamics::{BondWeights, PartialVolume};
 use crate::scene::expression::Expression;
 use crate::scene::value::{Coordinates, Number};
 
@@ -146,40 +149,32 @@ impl MaterialSpec {
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct PeridynamicsSpec {
     /// Horizon δ: a number, or an expression in x, y, z; three spacings of the points if left out, where no bond breaks.
-    #[serde(default)]
     pub horizon: Option<Expression>,
     /// Bond weights.
     #[serde(default)]
-    pub weights: WeightsSpec,
+    pub weights: BondWeights,
     /// Partial volume of a cell that the horizon cuts (SAND2015-7998 section 5.2.1); all but "full" need `points.lattice`.
-    #[serde(default)]
-    #[schemars(with = "Option<VolumesSpec>")]
-    pub volumes: Option<toml::Spanned<VolumesSpec>>,
+    #[schemars(with = "Option<PartialVolume>")]
+    pub volumes: Option<toml::Spanned<PartialVolume>>,
     /// Influence function of state-based laws; `{ degree = 3, alpha = 0 }` if left out.
-    #[serde(default)]
     pub influence: Option<InfluenceSpec>,
     /// Positions of the points; a lattice if left out, as fine as the cells of the zone where they are alike, else a third of the horizon.
-    #[serde(default)]
     pub points: Option<PointsSpec>,
     /// Dependence of the bond force on the displacement; "linear" without damage and "exact" with it if left out.
-    #[serde(default)]
-    #[schemars(with = "Option<super::motion::BondsSpec>")]
-    pub bonds: Option<toml::Spanned<super::motion::BondsSpec>>,
+    #[schemars(with = "Option<BondKinematics>")]
+    pub bonds: Option<toml::Spanned<BondKinematics>>,
     /// Constitutive law of the finite elements of the points' materials; "linear" if left out.
-    #[serde(default)]
     #[schemars(with = "Option<super::motion::ElementsSpec>")]
     pub elements: Option<toml::Spanned<super::motion::ElementsSpec>>,
     /// Storage of the weights of bonds in scenes in time and load steps; "double" if left out.
-    #[serde(default)]
-    #[schemars(with = "Option<super::motion::PrecisionSpec>")]
-    pub precision: Option<toml::Spanned<super::motion::PrecisionSpec>>,
+    #[schemars(with = "Option<Storage>")]
+    pub precision: Option<toml::Spanned<Storage>>,
     /// Calibration of the critical stretch to a fracture energy; "lattice" if left out.
-    #[serde(default)]
     #[schemars(with = "Option<super::motion::CalibrationSpec>")]
     pub calibration: Option<toml::Spanned<super::motion::CalibrationSpec>>,
     /// Treatment of bonds across the mesh's own boundary (a hole, a notch); "cut" if left out.
     #[serde(default)]
-    pub surfaces: SurfacesSpec,
+    pub surfaces: Surfaces,
 }
 
 impl PeridynamicsSpec {
@@ -188,34 +183,6 @@ impl PeridynamicsSpec {
         let typed = self.horizon.as_ref();
         typed.is_some_and(|h| h.as_constant().is_none())
     }
-}
-
-/// Weights of bonds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum WeightsSpec {
-    /// One weight per shell of bonds, so that the lattice carries exactly the typed elastic constants.
-    #[default]
-    Isotropic,
-    /// Volumes as they are, as in the papers; the lattice's stiffness is then not quite the typed one.
-    Plain,
-    /// Fitted family by family to the typed elastic constants; for points that are no lattice.
-    Fitted,
-}
-
-/// Partial volumes of the cells that the horizon cuts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum VolumesSpec {
-    /// A cell counts wholly if its point lies within the horizon (FL, FA, FV).
-    #[default]
-    Full,
-    /// A linear ramp over the last half spacing within the horizon.
-    Pdlammps,
-    /// The ramp of Hu, Ha and Bobaru, which goes on to half a spacing beyond the horizon.
-    Hhb,
-    /// The length, area or volume itself that the horizon cuts from the cell.
-    Exact,
 }
 
 /// Positions of the peridynamic points.
@@ -236,17 +203,5 @@ pub struct LatticeSpec {
     pub spacing: Number,
     /// Any point of the lattice; the mesh's lowest corner if left out, so that points coincide with the nodes of a
     /// mesh of the same spacing; with the coupling `truncated` half a spacing inside of that corner.
-    #[serde(default)]
     pub origin: Option<Coordinates>,
-}
-
-/// Treatment of bonds across the boundary of the mesh.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum SurfacesSpec {
-    /// Bonds that leave the body are cut.
-    #[default]
-    Cut,
-    /// Bonds reach across holes.
-    Uncut,
 }

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
+use crate::peridynamics::laws::StiffnessMean;
 use crate::scene::value::{Number, Text};
 
 /// Bonds between the points of two materials.
@@ -13,23 +14,10 @@ pub struct MaterialInterfaceSpec {
     /// The names of the two materials.
     pub between: Vec<Text>,
     /// The stiffness of these bonds, of laws whose bonds act alone; "harmonic-mean" if left out.
-    #[serde(default)]
-    #[schemars(with = "Option<StiffnessSpec>")]
-    pub stiffness: Option<Spanned<StiffnessSpec>>,
+    #[schemars(with = "Option<StiffnessMean>")]
+    pub stiffness: Option<Spanned<StiffnessMean>>,
     /// Energy per area of a crack along the interface, from which the critical stretch of these bonds follows.
-    #[serde(default)]
     pub fracture_energy: Option<Number>,
     /// Stretch at which these bonds break, instead of `fracture-energy`.
-    #[serde(default)]
     pub critical_stretch: Option<Number>,
-}
-
-/// The stiffness of a bond between two materials, by those of bonds within each.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum StiffnessSpec {
-    /// `2 a b/(a + b)`, as of two halves in series.
-    HarmonicMean,
-    /// `(a + b)/2`.
-    ArithmeticMean,
 }

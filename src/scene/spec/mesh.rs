@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
-use crate::mesh::MeshParts;
+use crate::mesh::{MeshParts, Order};
 use crate::scene::value::{Coordinates, Count, Number, Text};
 
 /// A generated mesh or one from a file.
@@ -97,21 +97,10 @@ pub struct FileMeshSpec {
     pub path: Text,
     /// Treatment of cells of second order; "kept" if left out.
     #[serde(default)]
-    pub order: FileOrderSpec,
+    pub order: Order,
     /// A mesh in memory that stands for the file; the source of the scene has it.
     #[serde(skip)]
     pub held: Option<Arc<MeshParts>>,
-}
-
-/// The order of the cells of a mesh from a file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum FileOrderSpec {
-    /// As the file has them.
-    #[default]
-    Kept,
-    /// Linear: nodes in the middle of edges are left out.
-    Linear,
 }
 
 /// A box that a generated mesh leaves out.
@@ -145,10 +134,8 @@ pub struct GradedSpec {
     /// Cell size in the fine interval.
     pub spacing: Number,
     /// Ratio of neighbouring cell sizes outside, at least 1.
-    #[serde(default)]
     pub growth: Option<Number>,
     /// The largest cell size.
-    #[serde(default)]
     pub largest: Option<Number>,
 }
 

@@ -27,9 +27,8 @@ mod table;
 mod user_material;
 
 pub use super::coupling_kinds::{
-    BalancedSpec, BetaSpec, BlendingSpec, CouplingSpec, CouplingTraits, CutBondsSpec, FormSpec,
-    InterfaceSpec, LatticeStart, LocalSpec, NonlocalSpec, PartialStressSpec, SpliceSpec,
-    TruncatedSpec, ZonesNeeded,
+    BalancedSpec, BlendingSpec, CouplingSpec, CouplingTraits, FormSpec, LatticeStart, LocalSpec,
+    NonlocalSpec, PartialStressSpec, SpliceSpec, TruncatedSpec, ZonesNeeded,
 };
 pub use condition::{TemperatureSpec, VoidSpec};
 pub use control::{
@@ -38,18 +37,16 @@ pub use control::{
 };
 pub use impactor::{CylinderSpec, ImpactorMotionSpec, ImpactorSpec, PlaneSpec, SphereSpec};
 pub use influence::{InfluenceSpec, MicromodulusSpec, PolynomialSpec};
-pub use material::{
-    LatticeSpec, MaterialSpec, PeridynamicsSpec, PointsSpec, SurfacesSpec, VolumesSpec, WeightsSpec,
-};
-pub use material_interface::{MaterialInterfaceSpec, StiffnessSpec};
+pub use material::{LatticeSpec, MaterialSpec, PeridynamicsSpec, PointsSpec};
+pub use material_interface::MaterialInterfaceSpec;
 pub use mesh::{
-    AxisSpec, BoxMeshSpec, CutoutSpec, FileMeshSpec, FileOrderSpec, GradedSpec, LineMeshSpec,
-    MeshSpec, PlaneCellSpec, RectangleMeshSpec, SolidCellSpec,
+    AxisSpec, BoxMeshSpec, CutoutSpec, FileMeshSpec, GradedSpec, LineMeshSpec, MeshSpec,
+    PlaneCellSpec, RectangleMeshSpec, SolidCellSpec,
 };
 pub use motion::{
-    BeyondLimitSpec, BondsSpec, CalibrationSpec, ContactSpec, ElementsSpec, ExplicitSpec,
-    GrowingModesSpec, InitialFieldSpec, InitialSpec, LoadStepSpec, NoOptionsSpec, PrecisionSpec,
-    QuasiStaticSpec, SolveSpec, TipSpec, WhenPartedSpec,
+    BeyondLimitSpec, CalibrationSpec, ContactSpec, ElementsSpec, ExplicitSpec, GrowingModesSpec,
+    InitialFieldSpec, InitialSpec, LoadStepSpec, NoOptionsSpec, QuasiStaticSpec, SolveSpec,
+    TipSpec, WhenPartedSpec,
 };
 pub use named_law::Given;
 pub use region::{
@@ -57,7 +54,7 @@ pub use region::{
     SegmentSpec, ShapeSpec, SkinSpec, TransitionSpec, WithoutSpec, ZonesSpec,
 };
 pub use table::TableSpec;
-pub use user_material::{EnergiesSpec, StrainsSpec, TangentSpec, UmatSpec};
+pub use user_material::{StrainsSpec, TangentSpec, UmatSpec};
 
 use std::collections::BTreeMap;
 
@@ -66,7 +63,9 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::condition_kinds::ConditionSpec;
+use super::error::Span;
 use super::value::{Number, Text};
+use crate::material::Kinematics;
 
 /// A scene of bondline: a body that is finite elements here and peridynamics there, at rest or in motion.
 ///
@@ -80,11 +79,10 @@ pub struct SceneSpec {
     #[serde(default)]
     pub title: Option<String>,
     /// The relative error that is wanted, 0.01 for 1 %: coupling, mesh, horizon, points and zone, as far as the scene leaves them out, are chosen for it.
-    #[serde(default)]
     pub accuracy: Option<Number>,
     /// Kinematic assumption by which the body represents a three-dimensional solid; fixes the dimension.
-    #[schemars(with = "KinematicsSpec")]
-    pub kinematics: Spanned<KinematicsSpec>,
+    #[schemars(with = "Kinematics")]
+    pub kinematics: Spanned<Kinematics>,
     /// The mesh: generated, or read from a file.
     pub mesh: MeshSpec,
     /// The materials by name. At most one of several may be without `cells`: it fills what the others leave.
@@ -93,7 +91,6 @@ pub struct SceneSpec {
     #[serde(default)]
     pub interfaces: BTreeMap<Text, MaterialInterfaceSpec>,
     /// Horizon, points and weights of the peridynamic region; needed unless the coupling is `local`.
-    #[serde(default)]
     pub peridynamics: Option<PeridynamicsSpec>,
     /// Nonlocal zone of the body, and transition zone where the two models overlap; all else is local. With "auto" the program places the zone.
     #[serde(default)]
@@ -114,7 +111,6 @@ pub struct SceneSpec {
     #[serde(default)]
     pub tables: BTreeMap<Text, TableSpec>,
     /// Temperature of the body; without it nothing expands.
-    #[serde(default)]
     pub temperature: Option<TemperatureSpec>,
     /// Displacements and velocities at time zero by name; at rest where none says otherwise.
     #[serde(default)]
@@ -129,7 +125,6 @@ pub struct SceneSpec {
     #[serde(default)]
     pub no_fail: BTreeMap<Text, ShapeSpec>,
     /// Short-range contact; none if left out.
-    #[serde(default)]
     pub contact: Option<ContactSpec>,
     /// Rigid bodies that strike or press, by name; scenes in time and load steps.
     #[serde(default)]
@@ -143,13 +138,15 @@ pub struct SceneSpec {
 }
 
 impl SceneSpec {
+    /// Span of the name of a material; an empty one of a name that there is not.
+    pub(super) fn span_of_material(&self, name: &str) -> Span {
+        let found = self.materials.get_key_value(name);
+        found.map_or(0..0, |(key, _)| key.span.clone())
+    }
+
     /// Space dimension.
     pub fn dimension(&self) -> usize {
-        match self.kinematics.get_ref() {
-            KinematicsSpec::Bar => 1,
-            KinematicsSpec::PlaneStress | KinematicsSpec::PlaneStrain => 2,
-            KinematicsSpec::Solid => 3,
-        }
+        self.kinematics.get_ref().dimension()
     }
 }
 
@@ -169,18 +166,4 @@ fn zones_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
         "description": "Where the body is nonlocal: a table, [zones], or \"auto\" for a zone that is placed by itself.",
         "anyOf": [table, { "enum": ["auto"] }]
     })
-}
-
-/// Kinematic assumption by which a body of one, two or three dimensions represents a solid.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum KinematicsSpec {
-    /// One dimension: uniaxial stress.
-    Bar,
-    /// Two dimensions: a thin plate.
-    PlaneStress,
-    /// Two dimensions: a long body.
-    PlaneStrain,
-    /// Three dimensions.
-    Solid,
 }

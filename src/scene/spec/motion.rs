@@ -34,34 +34,26 @@ pub struct ExplicitSpec {
     #[serde(default)]
     pub step: Automatic,
     /// Fraction of the measured stable step that "auto" takes; 0.95 if left out.
-    #[serde(default)]
     pub step_fraction: Option<Number>,
     /// Treatment of a step beyond the stable one; "refuse" if left out.
     #[serde(default)]
     pub beyond_limit: BeyondLimitSpec,
     /// Steps that the stiffest sites take in each step of all others; 1 if left out.
-    #[serde(default)]
     pub sub_steps: Option<Count>,
     /// Treatment of a run in which a mode doubles the energy; "refuse" if left out.
     #[serde(default)]
     pub growing_modes: GrowingModesSpec,
     /// Energy gained without work, as a part of the largest energy, at which the run stops; 0.1 if left out.
-    #[serde(default)]
     pub largest_energy_gain: Option<Number>,
     /// Rotation of an element in degrees at which the run stops; none if left out.
-    #[serde(default)]
     pub largest_rotation: Option<Number>,
     /// Number of VTU files after the first; 20 if left out, 0 for none but first and last.
-    #[serde(default)]
     pub outputs: Option<Count>,
     /// Time between VTU files, instead of `outputs`.
-    #[serde(default)]
     pub output_interval: Option<Number>,
     /// Time between rows of the history; a thousandth of the duration if left out.
-    #[serde(default)]
     pub history_interval: Option<Number>,
     /// Checkpoint after this many steps, or after this time of the clock: 1000, "10 min".
-    #[serde(default)]
     pub checkpoint_every: Option<Every>,
 }
 
@@ -94,31 +86,24 @@ pub struct QuasiStaticSpec {
     /// Number of load steps of equal length, the list of their times, the last of which takes the place of `duration`, or "auto": as long as nothing fails in them, and as short as `accuracy` where something does.
     pub steps: Steps,
     /// Value of t at the last step; 1 if left out.
-    #[serde(default)]
     pub duration: Option<Number>,
     /// Length of a step of `steps = "auto"` in which bonds break over its time: the accuracy of the load at which they do; 0.01 if left out.
-    #[serde(default)]
     pub accuracy: Option<Number>,
     /// Solution method of each step; "implicit" if left out.
     #[serde(default)]
     pub method: LoadStepSpec,
     /// Out-of-balance force at which a step is solved, relative to the largest forces of this load step and at the end of the last; 1e-8 if left out.
-    #[serde(default)]
     pub tolerance: Option<Number>,
     /// Most products with the tangent (implicit) or passes over the bonds (relaxation) of one equilibrium; 50000 if left out.
-    #[serde(default)]
     pub max_iterations: Option<Count>,
     /// Rotation of an element in degrees at which the run stops; none if left out.
-    #[serde(default)]
     pub largest_rotation: Option<Number>,
     /// Treatment of a body that has parted; "end" if left out.
     #[serde(default)]
     pub when_parted: WhenPartedSpec,
     /// Number of VTU files after the first; one per step if left out.
-    #[serde(default)]
     pub outputs: Option<Count>,
     /// Checkpoint after this many steps, or after this time of the clock: 10, "10 min".
-    #[serde(default)]
     pub checkpoint_every: Option<Every>,
 }
 
@@ -159,27 +144,13 @@ pub enum InitialSpec {
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct InitialFieldSpec {
     /// Region of the field; everywhere if left out.
-    #[serde(default)]
     pub inside: Option<ShapeSpec>,
     /// Component along x.
-    #[serde(default)]
     pub x: Option<Expression>,
     /// Component along y.
-    #[serde(default)]
     pub y: Option<Expression>,
     /// Component along z.
-    #[serde(default)]
     pub z: Option<Expression>,
-}
-
-/// Dependence of the bond force on the displacement.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum BondsSpec {
-    /// Along the deformed bond, by its stretch.
-    Exact,
-    /// Along the undeformed bond, to first order of the displacement.
-    Linear,
 }
 
 /// Constitutive law of the finite elements of the points' materials.
@@ -191,17 +162,6 @@ pub enum ElementsSpec {
     Linear,
     /// The bonds of the lattice under the deformation of the element, at any stretch and rotation.
     CauchyBorn,
-}
-
-/// Storage of the weights of bonds in scenes in time and load steps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum PrecisionSpec {
-    /// In eight bytes, or not at all where the points fill a lattice.
-    #[default]
-    Double,
-    /// One by one, in four bytes: forces are off by about 1e-8 of themselves.
-    Single,
 }
 
 /// Calibration of the critical stretch to a fracture energy.
@@ -220,10 +180,8 @@ pub enum CalibrationSpec {
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ContactSpec {
     /// Part of their distance at rest below which two points without a bond repel each other, never more than 1.35 spacings; 0.9 if left out.
-    #[serde(default)]
     pub radius_factor: Option<Number>,
     /// Stiffness of the repulsion over that of a bond as long as the horizon; 15 if left out.
-    #[serde(default)]
     pub stiffness_factor: Option<Number>,
 }
 
@@ -234,9 +192,7 @@ pub struct TipSpec {
     /// The direction in which the crack runs.
     pub direction: Coordinates,
     /// Region in which the tip is sought; everywhere if left out.
-    #[serde(default)]
     pub inside: Option<ShapeSpec>,
     /// Damage from which a point counts; 0.35 if left out.
-    #[serde(default)]
     pub threshold: Option<Number>,
 }

@@ -13,30 +13,23 @@ use crate::scene::value::{Coordinates, Number, Text};
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ZonesSpec {
     /// Nonlocal where a solution with finite elements alone says that it must be; `zones = "auto"` where no option is set.
-    #[serde(default)]
     #[schemars(with = "Option<AutoSpec>")]
     pub auto: Option<Spanned<AutoSpec>>,
     /// Peridynamics only. Cells whose centroid lies inside.
-    #[serde(default)]
     #[schemars(with = "Option<ShapeSpec>")]
     pub nonlocal: Option<Spanned<ShapeSpec>>,
     /// Both models at once (blending, partial stress). Cells whose centroid lies inside and that are not nonlocal.
-    #[serde(default)]
     #[schemars(with = "Option<TransitionSpec>")]
     pub transition: Option<Spanned<TransitionSpec>>,
     /// Action when damage reaches the edge of the nonlocal zone; "stop" if left out.
-    #[serde(default)]
     #[schemars(with = "Option<EdgeSpec>")]
     pub damage_at_edge: Option<Spanned<EdgeSpec>>,
     /// The nonlocal zone follows the crack; `{}` for the defaults. Scenes in time only.
-    #[serde(default)]
     #[schemars(with = "Option<FollowSpec>")]
     pub follow: Option<Spanned<FollowSpec>>,
     /// Cells of the nonlocal zone that are elements all the same, so that no bond is missing there.
-    #[serde(default)]
     pub skin: Option<SkinSpec>,
     /// Cells along which the seam runs. If left out, those of the mesh; but with truncated bonds whose faces do not follow the lattice "own", in 3D at once, else where they do not hold.
-    #[serde(default)]
     #[schemars(with = "Option<RimSpec>")]
     pub rim: Option<Spanned<RimSpec>>,
     /// Parts of the nonlocal zone with a horizon and a lattice of their own, by name; a layer of elements keeps them apart. Coupling `truncated` only.
@@ -49,13 +42,10 @@ pub struct ZonesSpec {
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct AutoSpec {
     /// Fraction of the critical stretch from which a bond is taken to be near breaking; 0.5 if left out.
-    #[serde(default)]
     pub stretch: Option<Number>,
     /// Horizons by which what is marked is padded, at least 1; 1 if left out, and 2 around cracks, voids and notches.
-    #[serde(default)]
     pub padding: Option<Number>,
     /// Error of the local model that may remain, relative in the norm of energy; 0.05 if left out.
-    #[serde(default)]
     pub tolerance: Option<Number>,
 }
 
@@ -64,13 +54,10 @@ pub struct AutoSpec {
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct FollowSpec {
     /// Fraction of the critical stretch from which a cell is wanted in the zone; 0.8 if left out.
-    #[serde(default)]
     pub stretch: Option<Number>,
     /// Distance by which the zone extends beyond such cells when it changes; five horizons if left out.
-    #[serde(default)]
     pub padding: Option<Number>,
     /// Distance by which it extends ahead of the tips of cracks when it changes; 1.5 paddings if left out.
-    #[serde(default)]
     pub ahead: Option<Number>,
 }
 
@@ -222,16 +209,12 @@ pub struct NearSpec {
     /// The distance.
     pub within: Number,
     /// A point.
-    #[serde(default)]
     pub point: Option<Coordinates>,
     /// A straight line.
-    #[serde(default)]
     pub segment: Option<SegmentSpec>,
     /// Straight lines from each point to the next.
-    #[serde(default)]
     pub polyline: Option<Vec<Coordinates>>,
     /// A closed polygon.
-    #[serde(default)]
     pub polygon: Option<Vec<Coordinates>>,
     /// An axis-parallel box.
     #[serde(default, rename = "box")]

@@ -11,10 +11,8 @@ use crate::scene::value::{Coordinates, Text};
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct TableSpec {
     /// Pairs of argument and value, arguments increasing.
-    #[serde(default)]
     pub points: Option<Vec<Coordinates>>,
     /// A file of two columns, relative to the scene; arguments increase.
-    #[serde(default)]
     pub file: Option<Text>,
     /// The table that expressions share; its rows may come later.
     #[serde(skip)]

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::region::CellsSpec;
+use crate::material::UmatEnergies;
 use crate::scene::value::{Count, Number, Text};
 
 /// A routine of a compiled library with the calling convention of Abaqus' UMAT.
@@ -13,30 +14,26 @@ pub struct UmatSpec {
     /// The library, relative to the scene; its code runs within the program.
     pub library: Text,
     /// The routine's name in the library; `umat_`, `umat` or `UMAT` if left out.
-    #[serde(default)]
     pub symbol: Option<Text>,
     /// Young's modulus E at rest.
     pub youngs_modulus: Number,
     /// Poisson's ratio at rest.
     pub poisson_ratio: Number,
     /// Density.
-    #[serde(default)]
     pub density: Option<Number>,
     /// Linear thermal expansion α per degree, with `[temperature]`: the routine gets the strain that is left.
-    #[serde(default)]
     pub thermal_expansion: Option<Number>,
     /// PROPS, the numbers that the routine takes.
     #[serde(default)]
     pub constants: Vec<Number>,
     /// NSTATV, the number of history variables of a point; 0 if left out.
-    #[serde(default)]
     pub state: Option<Count>,
     /// Admissible magnitude of strains and rotations.
     #[serde(default)]
     pub strains: StrainsSpec,
     /// Source of the energies.
     #[serde(default)]
-    pub energies: EnergiesSpec,
+    pub energies: UmatEnergies,
     /// Source of the tangent of Newton's method.
     #[serde(default)]
     pub tangent: TangentSpec,
@@ -47,22 +44,17 @@ pub struct UmatSpec {
     #[serde(default)]
     pub mean_dilatation: Option<bool>,
     /// TEMP; 0 if left out.
-    #[serde(default)]
     pub temperature: Option<Number>,
     /// CELENT; not a number if left out.
-    #[serde(default)]
     pub element_length: Option<Number>,
     /// Strength of the zero-energy control relative to the bonds of an LPS; 1 if left out, 0 switches it off.
-    #[serde(default)]
     pub stabilisation: Option<Number>,
     /// Resistance to deformations that are not uniform: a bond force, one by the lengths of bonds alone, or a drag (in explicit dynamics).
     #[serde(default)]
     pub zero_energy_control: ControlSpec,
     /// Stretch at which a bond breaks.
-    #[serde(default)]
     pub critical_stretch: Option<Number>,
     /// The cells that this material fills: the name of a set, or a shape that holds their centroids.
-    #[serde(default)]
     pub cells: Option<CellsSpec>,
 }
 
@@ -88,17 +80,6 @@ pub enum StrainsSpec {
     Small,
     /// Large ones: the rate form, with stresses turned by DROT.
     Large,
-}
-
-/// Source of the energies.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum EnergiesSpec {
-    /// The stress: stored is its elastic energy, the rest of the work is dissipated.
-    #[default]
-    Stress,
-    /// The routine: SSE, SPD and SCD.
-    Routine,
 }
 
 /// Source of the tangent of Newton's method.

@@ -1,9 +1,9 @@
 //! Parameters that a scene leaves open, and the keys of a candidate.
 
 use crate::variants::{self, Base, coordinates};
+use bondline::scene::SceneError;
 use bondline::scene::Source;
 use bondline::scene::spec::SceneSpec;
-use bondline::scene::{SceneError, SceneErrorKind};
 
 /// A scene with an `accuracy`, as far as the choice looks at it.
 #[derive(Clone, Debug)]
@@ -65,13 +65,12 @@ fn zoned(spec: &SceneSpec) -> bool {
 fn wanted_error(spec: &SceneSpec, source: &Source) -> Result<Option<f64>, SceneError> {
     match &spec.accuracy {
         Some(a) if a.value > 0.0 && a.value < 1.0 => Ok(Some(a.value)),
-        Some(a) => Err(SceneError::new(
-            SceneErrorKind::WrongValue,
-            format!("`accuracy` is {}", a.value),
-        )
-        .label(a.span.clone(), "must lie between 0 and 1")
-        .help("write the relative error that is wanted, accuracy = 0.01 for 1 %")
-        .shown_in(source)),
+        Some(a) => Err(
+            SceneError::wrong_value(format!("`accuracy` is {}", a.value))
+                .label(a.span.clone(), "must lie between 0 and 1")
+                .help("write the relative error that is wanted, accuracy = 0.01 for 1 %")
+                .shown_in(source),
+        ),
         None => Ok(None),
     }
 }
@@ -162,8 +161,7 @@ impl AccuracyRequest {
         if !self.breaks || points && !horizon {
             return Ok(());
         }
-        Err(SceneError::new(
-            SceneErrorKind::Missing,
+        Err(SceneError::missing(
             "`accuracy` cannot choose a horizon where bonds are cut or can break",
         )
         .label(self.spec.kinematics.span(), "in this scene")

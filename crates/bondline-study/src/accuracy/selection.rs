@@ -8,8 +8,8 @@ use super::refinement_sequence::{AFFORDABLE, Found, Ladder};
 use super::sample_run::Bench;
 use super::{ErrorPrediction, ErrorReference};
 use bondline::observe::summary::Decision;
+use bondline::scene::SceneError;
 use bondline::scene::Source;
-use bondline::scene::{SceneError, SceneErrorKind};
 
 /// A candidate: a family at a spacing.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,13 +65,10 @@ impl Chosen {
 }
 
 fn error(source: &Source, asked: &AccuracyRequest, why: &str) -> SceneError {
-    SceneError::new(
-        SceneErrorKind::Conflict,
-        format!("no choice for `accuracy = {}` runs: {why}", asked.accuracy),
-    )
-    .label(asked.spec.kinematics.span(), "in this scene")
-    .help("type the mesh, the horizon, the points and the coupling; `bondline check` says what they cost")
-    .shown_in(source)
+    SceneError::conflict(format!("no choice for `accuracy = {}` runs: {why}", asked.accuracy))
+        .label(asked.spec.kinematics.span(), "in this scene")
+        .help("type the mesh, the horizon, the points and the coupling; `bondline check` says what they cost")
+        .shown_in(source)
 }
 
 /// Returns the reasons for a candidate, and the error that is predicted for it.
