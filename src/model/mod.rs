@@ -19,7 +19,7 @@
 //! | `field_evaluation.rs` | displacements and their gradients anywhere | |
 //! | `distribution.rs` | which of several processes has which sites | |
 //! | `shared_families.rs`, `shared_body.rs`, `held_families.rs` | families that are spread over processes | |
-//! | `crack_band.rs` | area of cracks from the band of broken bonds | |
+//! | `crack_layers.rs` | area of cracks from the band of broken bonds | |
 //! | `bins.rs`, `zone_distance.rs` | positions in bins; distances to zones | |
 //!
 //! No file here knows a method of coupling; [`ZoneLayout`] is all that a method demands.
@@ -29,7 +29,7 @@ pub(crate) mod bond_cutting;
 pub(crate) mod completed_lattice;
 pub(crate) mod continued_lattice;
 pub(crate) mod coupled_model;
-pub(crate) mod crack_band;
+pub(crate) mod crack_layers;
 mod distribution;
 pub(crate) mod family_ends;
 pub mod field_evaluation;

@@ -34,7 +34,6 @@ use crate::material::Kinematics;
 use crate::mesh::Mesh;
 use crate::model::{PointSource, Zone};
 use crate::observe::checkpoint::Fingerprint;
-use crate::observe::provenance;
 use crate::observe::report::{components, number};
 use crate::observe::summary::Decision;
 use crate::peridynamics::bond_force::BondKinematics;
@@ -295,15 +294,14 @@ impl<'a, const D: usize> Draft<'a, D> {
             .map(|p| lattice_regions::bodies(spec, traits, p, mesh, &mut zones))
             .transpose()?;
         let points = self.point_materials(&selected.coupling, peridynamics.as_ref(), &zones)?;
-        let (used, law) = (points.used, points.law);
-        let (interfaces, told) = (points.interfaces, points.told);
+        let (used, law, told) = (points.used, points.law, points.told);
         self.check_horizon(peridynamics.as_ref(), &used, &zones)?;
         let (voids, barriers) = cracks_and_voids::obstacles(spec, mesh, &zones)?;
         if matches!(self.solve, Solve::Explicit(_)) {
             densities(spec, &self.materials)?;
         }
         self.check_laws(&selected.coupling, &used, &zones)?;
-        let breaking = failure::breaking(spec, &self.materials, &used, interfaces, mesh)?;
+        let breaking = failure::breaking(spec, &self.materials, &used, points.interfaces, mesh)?;
         let elements = self.elements(&selected.coupling, &used, law.as_ref(), breaking.bonds)?;
         self.check_heat(&selected.coupling, elements)?;
         let follow = adaptive_zone::follow(
@@ -315,8 +313,8 @@ impl<'a, const D: usize> Draft<'a, D> {
             mesh,
             |c| self.cell_material[c] == used[0],
         )?;
-        let mut output = output::output(spec, (mesh, self.kinematics), &voids, self.name)?;
-        output.origin = provenance::origin(self.fingerprint.value());
+        let by = (self.name, &self.fingerprint);
+        let output = output::output(spec, (mesh, self.kinematics), &voids, by)?;
         let scene = Scene {
             title: spec.title.clone().unwrap_or_else(|| self.name.to_owned()),
             kinematics: self.kinematics,

@@ -14,8 +14,9 @@ use crate::fem::Locator;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
 use crate::observe::ObserveError;
+use crate::observe::checkpoint::Fingerprint;
 use crate::observe::claim::{Claim, Files};
-use crate::observe::provenance::PROVENANCE;
+use crate::observe::provenance::{self, PROVENANCE};
 use crate::shape::Shape;
 
 /// The table of all probes; lines have tables by their own names beside it.
@@ -29,7 +30,7 @@ pub(crate) fn output<const D: usize>(
     spec: &SceneSpec,
     (mesh, kinematics): (&Mesh<D>, Kinematics),
     voids: &[Shape<D>],
-    name: &str,
+    (name, fingerprint): (&str, &Fingerprint),
 ) -> Result<Output<D>, SceneError> {
     let o = &spec.output;
     let moves = !matches!(
@@ -90,7 +91,7 @@ pub(crate) fn output<const D: usize>(
             .as_ref()
             .map_or("out".into(), |d| d.value.clone().into()),
         name: o.name.as_ref().map_or(name.to_owned(), |n| n.value.clone()),
-        origin: String::new(),
+        origin: provenance::origin(fingerprint.value()),
         vtu: o.vtu.unwrap_or(true),
         points: o.points,
         fields: field_choice(o, kinematics),

@@ -3,7 +3,7 @@
 use super::CoupledSystem;
 use crate::coupling::semidiscrete::behaviour::NONE;
 use crate::{
-    model::{SiteKind, crack_band},
+    model::{SiteKind, crack_layers},
     peridynamics::CrackArea,
     system::{Dissipation, ExactSum, Halfway},
 };
@@ -53,14 +53,14 @@ impl<const D: usize> CoupledSystem<'_, D> {
             let xi = body.bond(i as usize, j as usize);
             let horizon = body.cloud.horizon.of(i as usize);
             let layer = CrackArea::<D>::new(self.model.spacing_at(i), horizon).of(&xi);
-            (layer > 0.0).then(|| crack_band::BrokenBond {
+            (layer > 0.0).then(|| crack_layers::BrokenBond {
                 middle: body.cloud.position[i as usize] + xi * 0.5,
                 area: share * layer,
                 horizon,
             })
         };
         let bonds: Vec<_> = within.chain(at_seam).filter_map(bond).collect();
-        crack_band::area(&bonds)
+        crack_layers::area(&bonds)
     }
 
     /// Energy of the bonds that the pass over the body broke last.

@@ -1,4 +1,4 @@
-//! Area of cracks from the band of bonds that they have broken.
+//! Area of cracks from the layers of bonds that they have broken.
 //!
 //! A crack breaks bonds between next neighbours in one layer where it is slow, and in several where it is fast, rough or about to branch. Each bond stands for the area that a single
 //! layer would have (see [`CrackArea`](crate::peridynamics::CrackArea)), divided by the number of layers around it: the area of broken bonds within a horizon of it, projected on the plane of the crack, over the area
@@ -84,5 +84,5 @@ fn normal<const D: usize>(near: &[(Vector<D>, f64)], radius: f64) -> Vector<D> {
 }
 
 #[cfg(test)]
-#[path = "crack_band_tests.rs"]
+#[path = "crack_layers_tests.rs"]
 mod tests;
