@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """compare_runs.py LIMIT ONE SEVERAL: whether two folders hold the same results.
 
-With LIMIT 0 every file has the same bytes, those of checkpoints included. Else displacements in VTU and CSV files differ by at most LIMIT of the largest. With LIMIT
+With LIMIT 0 every file has the same bytes, those of checkpoints included, but for the provenance. Else displacements in VTU and CSV files differ by at most LIMIT of the largest. With LIMIT
 `readable` every VTU file of the first folder can be read, and that is all.
 
 A VTU file of one process may be a PVTU file of several. Its pieces together then hold each cell once and each point at least once, by their numbers in the file of one process; with
@@ -131,8 +131,8 @@ def main(limit, one, several):
             fields(path)
         return 0
     limit = float(limit)
-    names = {p.name for p in one.iterdir()}
-    others = {p.name for p in several.iterdir()}
+    # the provenance of a run has its times
+    names, others = ({p.name for p in folder.iterdir() if not p.name.endswith(".run.json")} for folder in (one, several))
     lists = {p.with_suffix(".vtu").name: p for p in several.glob("*.pvtu")}
     for name, path in lists.items():
         # what the list does not name is left over

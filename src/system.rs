@@ -105,7 +105,7 @@ impl Interval {
 
 /// Cost of the bonds broken so far, and energy that laws with memory have dissipated.
 ///
-/// Units: \[J\] and \[m²\] (per thickness and \[m\] in 2D, per section and a number in 1D).
+/// Units: \[J\] (per thickness in 2D, per section in 1D).
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Dissipation {
     /// Energy that was stored just before less that stored just after bonds broke, at the same displacement.

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use bondline::observe::vtu::Snapshot;
 use bondline::scene::{SceneErrorKind, Source};
 use bondline::{
     AnyScene, Condition, Function, Initial, Material, Region, SceneBuilder, Silent, Solution,
@@ -30,6 +31,14 @@ conditions.left.displacement = { on = "left", x = 0 }
 output.probes.middle.at = 5
 "#;
 
+/// A snapshot without the hash of its scene: functions have no text.
+fn unnamed(snapshot: &Snapshot) -> Snapshot {
+    Snapshot {
+        origin: String::new(),
+        ..snapshot.clone()
+    }
+}
+
 fn from_text(more: &str) -> Solution {
     let source = Source::new("bar.toml", format!("{BAR}{more}"));
     let scene = AnyScene::from_source(&source, Path::new(""), "bar").unwrap();
@@ -46,7 +55,7 @@ fn a_static_scene_with_functions_has_the_bits_of_one_with_expressions() {
         .solve(&Silent)
         .unwrap();
     let typed = from_text("conditions.pull.body-force.x = \"1e-3 * x\"");
-    assert_eq!(built.snapshot(), typed.snapshot());
+    assert!(unnamed(built.snapshot()) == unnamed(typed.snapshot()));
     assert_eq!(
         built.table("probes").unwrap(),
         typed.table("probes").unwrap()
@@ -87,7 +96,10 @@ fn a_run_in_time_with_functions_has_the_bits_of_one_with_expressions() {
         "solve.explicit = { duration = 2, outputs = 3 }\ninitial.pushed.velocity.x = \"1e-3 * x\"\nconditions.pull.traction = { on = \"right\", x = \"1e-3 * t\" }\nconditions.weight.body-force.x = \"1e-4 * x * t\"",
     );
     assert_eq!(built.frames().count(), 4);
-    assert!(built.frames().eq(typed.frames()));
+    let frames = |of: &Solution| -> Vec<Snapshot> {
+        of.frames().map(|frame| unnamed(frame.snapshot())).collect()
+    };
+    assert!(frames(&built) == frames(&typed));
     assert_eq!(
         built.table("history").unwrap(),
         typed.table("history").unwrap()
@@ -117,7 +129,7 @@ fn displacements_that_a_function_prescribes_are_those_of_the_expression() {
     let typed = from_text(
         "solve.explicit.duration = 1\nconditions.right.displacement = { on = \"right\", x = \"1e-4 * x * t\" }",
     );
-    assert_eq!(built.snapshot(), typed.snapshot());
+    assert!(unnamed(built.snapshot()) == unnamed(typed.snapshot()));
 }
 
 #[test]

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ObserveError;
 use super::pieces::stem;
+use super::provenance::PROVENANCE;
 use crate::regular_file;
 
 /// The files of one run in its folder.
@@ -71,7 +72,9 @@ impl Files {
         let alone = || {
             let first = ["vtu", "pvtu"].map(|end| folder.join(format!("{}_0000.{end}", self.name)));
             let first = first.into_iter().find(|file| file.exists())?;
-            let is_own = self.files.iter().any(|file| folder.join(file).exists());
+            // scenes at rest leave provenance too
+            let mut kinds = self.files.iter().filter(|file| !file.ends_with(PROVENANCE));
+            let is_own = kinds.any(|file| folder.join(file).exists());
             let foreign = self.series && !was_claimed && !is_own;
             foreign.then(|| (first, "a scene of another name".to_owned()))
         };

@@ -52,6 +52,10 @@ fn run<const D: usize>(
     let claim = || scene.output.claim(&scene.title, !is_static, processes);
     let claimed = options.writes().then(claim).transpose();
     let _claim = agreed(options.ranks, claimed, &scene.output.directory)?;
+    if options.writes() {
+        // that of an earlier run would be taken for that of this one if it is killed
+        let _ = std::fs::remove_file(scene.output.provenance_path());
+    }
     if is_static {
         return statics::run(scene, options, progress);
     }
@@ -203,8 +207,7 @@ impl AnyScene {
 
     /// The file of the [`Provenance`](provenance::Provenance) of a run.
     pub fn provenance_path(&self) -> PathBuf {
-        let (folder, name) = each!(self, s => (&s.output.directory, &s.output.name));
-        folder.join(format!("{name}{}", provenance::PROVENANCE))
+        each!(self, s => s.output.provenance_path())
     }
 
     /// Warnings of parts of the scene that touch nothing.

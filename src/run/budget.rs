@@ -81,7 +81,7 @@ fn control_group() -> Option<u64> {
 
 /// Sizes of a scene, counted from volumes.
 ///
-/// Points within a hundredth where cells are larger than the spacing; bonds within a tenth of those of whole families, and near surfaces fewer exist.
+/// Points within a hundredth where cells are larger than the spacing; bonds within a tenth of those of whole families from a horizon of two spacings on, and near surfaces fewer exist.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Counts {
     /// Nodes of the mesh.

@@ -1,5 +1,7 @@
 //! Output of a scene: lines, probes, sections, tips of cracks.
 
+use std::path::PathBuf;
+
 use toml::Spanned;
 
 use super::bounds_checks;
@@ -133,6 +135,11 @@ impl<const D: usize> Output<D> {
             return Ok(None);
         }
         Claim::take(&self.directory, scene, &files).map(Some)
+    }
+
+    /// The file of the provenance of a run by the program.
+    pub(crate) fn provenance_path(&self) -> PathBuf {
+        self.directory.join(format!("{}{PROVENANCE}", self.name))
     }
 
     /// The files that a scene writes, or removes for those that another number of processes has written: at rest, or where it `moves`.

@@ -23,6 +23,7 @@ mod parts;
 mod plasticity;
 mod position_aware;
 mod position_aware_seams;
+mod provenance;
 mod restarts;
 mod scalar_damage;
 mod softening;
@@ -89,12 +90,16 @@ fn run(folder: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// All files of a folder with their bytes; the checkpoint but one is where it was killed last, so it is left out.
+/// All files of a folder with their bytes; the checkpoint but one is where it was killed last, and provenance has times: both are left out.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     std::fs::read_dir(folder)
         .unwrap()
         .map(|e| e.unwrap().path())
-        .filter(|p| !p.to_string_lossy().ends_with(".previous"))
+        .filter(|p| {
+            ![".previous", ".run.json"]
+                .iter()
+                .any(|end| p.to_string_lossy().ends_with(end))
+        })
         .map(|p| {
             let name = p.file_name().unwrap().to_string_lossy().into_owned();
             (name, std::fs::read(&p).unwrap())

@@ -362,11 +362,6 @@ fn run(
         Some(_) => scene.run_with(&options, &Silent),
     };
     let summary = summary.map_err(|e| miette::miette!("{e}"))?;
-    if is_first && !summary.files.is_empty() {
-        let processes = ranks.map_or(1, Ranks::count);
-        let written = Provenance::new(&summary, COMMIT, processes).write(&provenance);
-        written.map_err(|e| miette::miette!("{e}"))?;
-    }
     let code = match summary.motion.as_ref().map(|m| m.ended) {
         None | Some(Ended::Finished | Ended::Parted) => DONE,
         Some(Ended::DamageAtEdge | Ended::EnergyGained | Ended::ElementsRotated) => AT_EDGE,
@@ -375,7 +370,12 @@ fn run(
     match (is_first, json) {
         (false, _) => {}
         (true, true) => print(summary.json().map_err(|e| miette::miette!("{e}"))?)?,
-        (true, false) => print(summary)?,
+        (true, false) => print(&summary)?,
+    }
+    if is_first && !summary.files.is_empty() {
+        let processes = ranks.map_or(1, Ranks::count);
+        let written = Provenance::new(&summary, COMMIT, processes).write(&provenance);
+        written.map_err(|e| miette::miette!("{e}"))?;
     }
     Ok(code)
 }

@@ -10,7 +10,7 @@ use crate::solve::explicit::State;
 /// Areas are those of the summary: m² (m in 2D, a number in 1D).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CrackGrowth {
-    /// Area of the cracks at the last row.
+    /// Largest area of the cracks at a row.
     area: f64,
     /// Largest growth in one step.
     largest: f64,
@@ -37,7 +37,8 @@ impl CrackGrowth {
         if growth > self.largest {
             (self.largest, self.step, self.time) = (growth, state.step, state.time);
         }
-        self.area = area;
+        // two cracks that meet may count less than they did apart
+        self.area = self.area.max(area);
     }
 
     /// Returns the warning of load steps of which one took most of the crack, or in which breaking set much energy free; energies \[J\] (per metre of thickness in 2D).
@@ -54,17 +55,16 @@ impl CrackGrowth {
             let has_run = self.area > 0.0 && self.area >= told;
             return (has_run && free > SET_FREE * dissipated).then(|| {
                 format!(
-                    "breaking set free {:.0} % of what it dissipated: the crack ran on within load steps, where bonds beside its path break too; both its length and its energy are then too large, and [solve.explicit] follows it",
+                    "breaking set free {:.0} % of what it dissipated: the crack ran on within load steps, where bonds beside its path break too; its energy is then too large, and [solve.explicit] follows it",
                     100.0 * free / dissipated
                 )
             });
         }
         Some(format!(
-            "load step {}, t = {}, alone took {:.0} % of the crack: it ran on within the step, where bonds beside its path break too, so that its {} and energy come out too large, and the states in between are left out; smaller load steps tell whether the crack grows with the load, and [solve.explicit] follows one that runs by itself",
+            "load step {}, t = {}, alone took {:.0} % of the crack: it ran on within the step, where bonds beside its path break too, so that its energy comes out too large, and the states in between are left out; smaller load steps tell whether the crack grows with the load, and [solve.explicit] follows one that runs by itself",
             self.step,
             number(self.time),
             100.0 * self.largest / self.area,
-            if D == 2 { "length" } else { "area" },
         ))
     }
 }

@@ -185,6 +185,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
     /// Finds the probes in another layout of the same body.
     pub fn move_to(&mut self, sampler: &Sampler<'_, D>) {
         self.probes.find(sampler);
+        self.cracks = (0, 0.0);
     }
 
     /// Finds the part of a model beyond each section, and takes the springs that hold the model.

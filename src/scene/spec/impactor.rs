@@ -62,10 +62,14 @@ pub struct PlaneSpec {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ImpactorMotionSpec {
+    // with defaults a list may have fewer components: `velocity = [0, -1]`
     /// Component along x.
+    #[serde(default)]
     pub x: Option<Expression>,
     /// Component along y.
+    #[serde(default)]
     pub y: Option<Expression>,
     /// Component along z.
+    #[serde(default)]
     pub z: Option<Expression>,
 }

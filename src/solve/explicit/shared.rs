@@ -17,7 +17,7 @@ pub(super) struct Shared {
 pub(super) struct Outcome {
     /// Bonds that broke.
     pub broken: u64,
-    /// Energy and area that they cost, where these are still to be added over processes.
+    /// Energy that they cost, where these are still to be added over processes.
     pub lost: ExactSum,
 }
 
