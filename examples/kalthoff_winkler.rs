@@ -17,6 +17,15 @@ fn main() -> ExitCode {
     shared::printed(tables())
 }
 
+/// Horizon of the scene \[m\].
+const HORIZON: f64 = 2e-3;
+
+/// Distance of the crack tip from that of the notch at the end \[m\].
+fn advance(tip: &Columns, notch: [f64; 2]) -> Result<f64, Failure> {
+    let end = |name| Ok::<_, Failure>(*tip.column(name)?.last().ok_or("an empty table")?);
+    Ok((end("x")? - notch[0]).hypot(end("y")? - notch[1]))
+}
+
 /// Angle in degrees between the notch and the way from its tip to that of the crack, when this is `RUN` away; and the time.
 fn angle(tip: &Columns, notch: [f64; 2]) -> Result<(f64, f64), Failure> {
     let (time, x, y) = (tip.column("time")?, tip.column("x")?, tip.column("y")?);
@@ -47,8 +56,23 @@ fn tables() -> Result<Vec<Table>, Failure> {
                     .join(format!("kalthoff_winkler_{end}.csv")),
             )
         };
-        let (lower, time) = angle(&read("tip_lower")?, [0.05, 0.075])?;
-        let (upper, _) = angle(&read("tip_upper")?, [0.05, 0.125])?;
+        let tips = [("tip_lower", [0.05, 0.075]), ("tip_upper", [0.05, 0.125])];
+        let [(lower, time), (upper, _)] = [
+            angle(&read(tips[0].0)?, tips[0].1)?,
+            angle(&read(tips[1].0)?, tips[1].1)?,
+        ];
+        // the ways are almost straight
+        let advances = tips.map(|(tip, notch)| advance(&read(tip)?, notch));
+        let [lower_advance, upper_advance] = advances;
+        let advanced = lower_advance? + upper_advance?;
+        let cracks = summary.motion.as_ref().and_then(|motion| motion.cracks);
+        let length = cracks.ok_or("no bond has broken")?.area;
+        table.push(TableRow::at_most(
+            name,
+            "crack length beyond the advance of the tips, horizons a crack",
+            0.5 * (length - advanced).abs() / HORIZON,
+            1.0,
+        ));
         for (which, angle) in [("lower", lower), ("upper", upper)] {
             table.push(between(
                 name,
