@@ -198,7 +198,7 @@ fn checkpoints_of_another_scene_and_damaged_ones_are_refused_by_name() {
     for (bytes, what) in [
         (whole[..whole.len() / 2].to_vec(), "is cut off"),
         (b"something else".to_vec(), "is no checkpoint of bondline"),
-        ([&whole[..8], &[9], &whole[9..]].concat(), "has format 9"),
+        ([&whole[..8], &[99], &whole[9..]].concat(), "has format 99"),
         (
             whole
                 .iter()
