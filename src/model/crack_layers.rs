@@ -38,6 +38,11 @@ pub fn area<const D: usize>(bonds: &[BrokenBond<D>]) -> f64 {
             .map(|other| (places[other] - places[k], bonds[other].area))
             .filter(|(x, _)| x.norm() <= radius)
             .collect();
+        if D == 1 {
+            // each crack of a bar by its first bond
+            let is_first = near.iter().all(|(x, _)| x[0] >= 0.0);
+            return bonds[k].area * f64::from(u8::from(is_first));
+        }
         let layers = layers(&near, bonds[k].horizon);
         bonds[k].area / if layers > ONE_LAYER { layers } else { 1.0 }
     });
@@ -54,12 +59,11 @@ fn layers<const D: usize>(near: &[(Vector<D>, f64)], horizon: f64) -> f64 {
     near.iter().map(along).sum()
 }
 
-/// A smooth window of unit integral over a crack, which vanishes at `s` = 1: none over the cracks of a bar, which are points.
+/// A smooth window of unit integral over a crack, a line or a surface, which vanishes at `s` = 1.
 fn window(dimension: usize, s: f64) -> f64 {
     use std::f64::consts::PI;
     let bell = if s < 1.0 { 1.0 + (PI * s).cos() } else { 0.0 };
     match dimension {
-        1 => 1.0,
         2 => 0.5 * bell,
         _ => bell / (PI - 4.0 / PI),
     }

@@ -138,4 +138,6 @@ fn bars_crack_once_within_a_horizon() {
     assert!((broken(&[10.2]) - 1.0).abs() < 1e-12);
     assert!((broken(&[10.2, 11.2, 12.2]) - 1.0).abs() < 1e-12);
     assert!((broken(&[10.2, 20.2]) - 2.0).abs() < 1e-12);
+    // two holes of a bar in pieces
+    assert!((broken(&[10.2, 11.2, 17.2, 18.2, 19.2]) - 2.0).abs() < 1e-12);
 }

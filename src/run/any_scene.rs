@@ -52,10 +52,6 @@ fn run<const D: usize>(
     let claim = || scene.output.claim(&scene.title, !is_static, processes);
     let claimed = options.writes().then(claim).transpose();
     let _claim = agreed(options.ranks, claimed, &scene.output.directory)?;
-    if options.writes() {
-        // that of an earlier run would be taken for that of this one if it is killed
-        let _ = std::fs::remove_file(scene.output.provenance_path());
-    }
     if is_static {
         return statics::run(scene, options, progress);
     }

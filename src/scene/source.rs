@@ -400,11 +400,24 @@ const WITHOUT_EFFECT: &[&[&str]] = &[
     &["solve", "quasi-static", "checkpoint-every"],
 ];
 
+/// Returns true for a key that changes no result, and for a table of such keys alone.
+fn is_without_effect(path: &[String], value: &DeValue<'_>) -> bool {
+    let is_one = |key: Option<&str>| {
+        let path = || path.iter().map(String::as_str).chain(key);
+        WITHOUT_EFFECT.iter().any(|p| path().eq(p.iter().copied()))
+    };
+    let of_such = |table: &DeTable<'_>| {
+        let mut keys = table.iter().map(|(key, _)| key.get_ref());
+        table.iter().next().is_some() && keys.all(|key| is_one(Some(key)))
+    };
+    is_one(None) || value.as_table().is_some_and(of_such)
+}
+
 fn add_table(table: &DeTable<'_>, path: &mut Vec<String>, print: &mut Fingerprint) {
     // the tables of the toml crate are sorted by key
     for (key, value) in table.iter() {
         path.push(key.get_ref().to_string());
-        if !WITHOUT_EFFECT.iter().any(|p| path.iter().eq(p.iter())) {
+        if !is_without_effect(path, value.get_ref()) {
             print.add(key.get_ref().as_bytes());
             add_value(value.get_ref(), path, print);
             if !value.get_ref().is_table() {

@@ -79,3 +79,41 @@ fn the_version_names_the_commit_that_provenance_names() {
         commit.map_or(wanted.clone(), |c| format!("{wanted} ({c})"))
     );
 }
+
+#[test]
+fn a_resumption_that_is_refused_leaves_it_and_another_folder_is_no_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    // without a table of outputs, which `--set` then makes
+    let typed = BREAKING.replace("duration = 60", "duration = 3");
+    let typed = typed.split("[output]").next().unwrap();
+    write(folder.path(), "bar.toml", typed);
+    run(
+        folder.path(),
+        &["bar.toml", "--checkpoint-every", "5", "--output", "o"],
+    );
+    let path = folder.path().join("o/bar.run.json");
+    let before = std::fs::read(&path).unwrap();
+    let resume = |set: &str| {
+        let mut command = bondline(folder.path());
+        command.args([
+            "run",
+            "bar.toml",
+            "--resume",
+            "--set",
+            "output.directory=o",
+            "--set",
+            set,
+        ]);
+        command.output().unwrap()
+    };
+    assert!(
+        !resume("materials.plate.bond-based.density=2")
+            .status
+            .success()
+    );
+    assert_eq!(std::fs::read(&path).unwrap(), before);
+    let resumed = resume("solve.explicit.checkpoint-every=5");
+    let said = String::from_utf8_lossy(&resumed.stderr);
+    assert!(resumed.status.success(), "{said}");
+    assert_ne!(std::fs::read(&path).unwrap(), before);
+}

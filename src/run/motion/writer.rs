@@ -479,6 +479,8 @@ fn files_begun<const D: usize>(
     if options.writes() {
         if written.is_none() {
             checkpoint.remove()?;
+            // that of an earlier run would be taken for that of this one if it is killed
+            let _ = std::fs::remove_file(output.provenance_path());
             series.remove_collection();
         }
         series.remove_later();
