@@ -211,6 +211,8 @@ fn time_with_contact(pass: &mut dyn BondPass<3>, n: usize, passes: usize) -> Vec
         approach: 0.9,
         stiffness: 1e20,
         skin: 0.25 * H,
+        cracks: Vec::new(),
+        horizon: 0.0,
     })
     .expect("contact");
     let u = motion(pass.points() * 3);

@@ -70,6 +70,7 @@
 //! | [`material`] | local laws: displacement gradient to energy, stress, tangent |
 //! | [`fem`] | cells, quadrature, the element kernel, loads |
 //! | [`peridynamics`] | families, influence functions, bond weights, laws, the PD body |
+//! | [`contact`] | surfaces that press on each other, friction, closed cracks |
 //! | [`coupling`] | sites, what completes families and elements at the seam, one file per method |
 //! | [`assembly`] | sparse rows: places through sites, and the accumulator of one stiffness row |
 //! | [`system`] | the seam to solvers: a block-sparse stiffness and its symmetry |
@@ -189,6 +190,7 @@
 //! Keys in brackets, such as [SAND2015-7998], are resolved in `docs/references.md`.
 
 pub mod assembly;
+pub mod contact;
 pub mod coupling;
 mod dimension;
 pub mod fem;

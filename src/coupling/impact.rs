@@ -25,9 +25,11 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::tensor::Vector;
-use crate::{model::Model, parallel};
+use crate::{
+    model::{Model, clearance},
+    parallel,
+};
 
-mod clearance;
 mod shape;
 mod term;
 

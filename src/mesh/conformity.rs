@@ -10,11 +10,11 @@ use crate::tensor::Vector;
 /// A node this near to a facet lies on it, over the longest side of the facet.
 const ON_FACET: f64 = 1e-6;
 
-/// Refuses a facet of three cells, and a node that lies on a facet at the boundary of which it is none.
+/// Refuses a facet of three cells, and a node that lies on a facet at the boundary of its body of which it is none.
 ///
 /// # Errors
 /// [`MeshError::CrowdedFacet`], [`MeshError::HangingNode`].
-pub(super) fn check<const D: usize>(mesh: &Mesh<D>) -> Result<(), MeshError> {
+pub(super) fn check<const D: usize>(mesh: &Mesh<D>, bodies: &[u32]) -> Result<(), MeshError> {
     if D == 1 {
         return Ok(());
     }
@@ -34,11 +34,15 @@ pub(super) fn check<const D: usize>(mesh: &Mesh<D>) -> Result<(), MeshError> {
             }
         }
     }
-    check_nodes(mesh, &outer)
+    check_nodes(mesh, &outer, bodies)
 }
 
 /// Looks for nodes at the boundary that lie on facets of others: along a skew line, on which grids do not pile up.
-fn check_nodes<const D: usize>(mesh: &Mesh<D>, outer: &[BoundaryFacet]) -> Result<(), MeshError> {
+fn check_nodes<const D: usize>(
+    mesh: &Mesh<D>,
+    outer: &[BoundaryFacet],
+    bodies: &[u32],
+) -> Result<(), MeshError> {
     let line: Vector<D> = Vector::from_fn(|k, _| [1.0, 0.618_033_988_7, 0.324_717_957_2][k]);
     let mut nodes: Vec<u32> = outer.iter().flat_map(|f| f.nodes.iter().copied()).collect();
     nodes.sort_unstable();
@@ -64,7 +68,8 @@ fn check_nodes<const D: usize>(mesh: &Mesh<D>, outer: &[BoundaryFacet]) -> Resul
         for &(_, n) in near.take_while(|(s, _)| *s <= last + reach * line.norm()) {
             let x = place(n);
             let is_outside = (0..D).any(|k| x[k] < low[k] - reach || x[k] > high[k] + reach);
-            if is_outside || facet.nodes.contains(&n) {
+            let is_other = bodies[n as usize] != bodies[facet.nodes[0] as usize];
+            if is_outside || is_other || facet.nodes.contains(&n) {
                 continue;
             }
             let mut triangles = vec![corners.clone()];
@@ -90,6 +95,11 @@ mod tests {
     use super::super::CellShape;
     use super::super::generate::{Axis, Grid};
     use super::*;
+
+    /// Of a mesh that is one body.
+    fn check<const D: usize>(mesh: &Mesh<D>) -> Result<(), MeshError> {
+        super::check(mesh, &vec![0; mesh.nodes.len()])
+    }
 
     /// Quadrilaterals by their corners.
     fn mesh(nodes: &[[f64; 2]], cells: &[[u32; 4]]) -> Mesh<2> {
@@ -123,6 +133,13 @@ mod tests {
         );
         let whole = mesh(&nodes, &[[0, 1, 2, 3], [1, 4, 7, 2]]);
         assert!(check(&whole).is_ok());
+        // of another body a node may lie there
+        let mut apart = mesh(&nodes[..4], &[[0, 1, 2, 3]]);
+        let others = [[1.0, -0.5], [2.0, -0.5], [2.0, 0.5], [1.0, 0.5]];
+        apart.nodes.extend(others.map(Vector::<2>::from));
+        apart.push_cell(CellShape::Quad4, &[4, 5, 6, 7]);
+        assert!(check(&apart).is_err());
+        assert!(super::check(&apart, &apart.bodies()).is_ok());
     }
 
     #[test]

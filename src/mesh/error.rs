@@ -289,7 +289,7 @@ pub enum MeshError {
     },
     /// Two nodes at one place.
     #[error(
-        "nodes {first} and {second} both lie at {position} ({distance:.3e} apart; counted from 0); merge them (in Gmsh: Coherence Mesh; in a deck: Merge Instances), or leave a gap between parts that are not bonded"
+        "nodes {first} and {second} both lie at {position} ({distance:.3e} apart; counted from 0); merge them (in Gmsh: Coherence Mesh; in a deck: Merge Instances), or leave a gap between parts that are not bonded; separate parts that touch need contact = {{}}"
     )]
     CoincidentNodes {
         /// Number of one, from 0.
@@ -313,7 +313,7 @@ pub enum MeshError {
     },
     /// A node on a face of a cell that is not its own.
     #[error(
-        "node {node} at {position}, counted from 0, lies on a face of cell {cell} with its centroid at {centroid}, of which it is no node: the body would tear or overlap there; mesh both sides with the same nodes (in Gmsh: BooleanFragments, Coherence), or leave a gap between parts that are not bonded"
+        "node {node} at {position}, counted from 0, lies on a face of cell {cell} with its centroid at {centroid}, of which it is no node: the body would tear or overlap there; mesh both sides with the same nodes (in Gmsh: BooleanFragments, Coherence), or leave a gap between parts that are not bonded; separate parts that touch need contact = {{}}"
     )]
     HangingNode {
         /// Number of the node, from 0.

@@ -15,6 +15,7 @@
 //! | `quality.rs` | checks that refuse a mesh no element can live on |
 //! | `facet.rs` | a facet seen from its cell |
 //! | `boundary.rs` | boundary and interface facets, distances to them |
+//! | `bodies.rs` | nodes that cells hold together |
 //! | `conformity.rs` | conformity of cells, which have to meet face to face |
 //! | `visibility.rs` | bonds that leave the mesh |
 //! | `dilate_erode.rs` | sets of cells that grow and shrink |
@@ -24,6 +25,7 @@
 
 use std::collections::BTreeMap;
 
+mod bodies;
 pub mod boundary;
 mod cell_shape;
 mod conformity;

@@ -76,6 +76,14 @@ impl<const D: usize> Mesh<D> {
 /// Named by number, place and value: a reference to a node or cell that does not exist, a coordinate that is no number,
 /// a node without a cell, two nodes at one place, an inverted or degenerate cell, cells that do not meet face to face.
 pub fn check<const D: usize>(mesh: &Mesh<D>) -> Result<Quality, MeshError> {
+    check_bodies(mesh, false)
+}
+
+/// As [`check`], of bodies that may touch each other, with nodes at one place or on faces of another, where `may_touch`.
+///
+/// # Errors
+/// As [`check`].
+pub fn check_bodies<const D: usize>(mesh: &Mesh<D>, may_touch: bool) -> Result<Quality, MeshError> {
     check_references(mesh)?;
     for (node, x) in mesh.nodes.iter().enumerate() {
         if !x.iter().all(|v| v.is_finite()) {
@@ -91,7 +99,12 @@ pub fn check<const D: usize>(mesh: &Mesh<D>) -> Result<Quality, MeshError> {
         let position = position(mesh.nodes[node].as_slice());
         return Err(MeshError::IsolatedNode { node, position });
     }
-    check_coincidence(mesh)?;
+    let bodies = if may_touch {
+        mesh.bodies()
+    } else {
+        vec![0; mesh.nodes.len()]
+    };
+    check_coincidence(mesh, &bodies)?;
     let mut quality = Quality {
         shortest_edge: f64::INFINITY,
         longest_edge: 0.0,
@@ -127,7 +140,7 @@ pub fn check<const D: usize>(mesh: &Mesh<D>) -> Result<Quality, MeshError> {
         quality.volume += volume;
     }
     check_thickness(mesh)?;
-    conformity::check(mesh)?;
+    conformity::check(mesh, &bodies)?;
     Ok(quality)
 }
 
@@ -203,8 +216,8 @@ fn check_references<const D: usize>(mesh: &Mesh<D>) -> Result<(), MeshError> {
     Ok(())
 }
 
-/// Refuses two nodes at one place, by sorting along a skew line so that grids do not pile up on it.
-fn check_coincidence<const D: usize>(mesh: &Mesh<D>) -> Result<(), MeshError> {
+/// Refuses two nodes of a body at one place, by sorting along a skew line so that grids do not pile up on it.
+fn check_coincidence<const D: usize>(mesh: &Mesh<D>, bodies: &[u32]) -> Result<(), MeshError> {
     let (lo, hi) = mesh.bounds();
     let tolerance = COINCIDENT * (hi - lo).amax();
     let line: Vector<D> = Vector::from_fn(|k, _| [1.0, 0.618_033_988_7, 0.324_717_957_2][k]);
@@ -222,7 +235,7 @@ fn check_coincidence<const D: usize>(mesh: &Mesh<D>) -> Result<(), MeshError> {
                 break;
             }
             let distance = (mesh.nodes[i as usize] - mesh.nodes[j as usize]).norm();
-            if distance <= tolerance {
+            if distance <= tolerance && bodies[i as usize] == bodies[j as usize] {
                 return Err(MeshError::CoincidentNodes {
                     first: i.min(j),
                     second: i.max(j),

@@ -3,6 +3,7 @@
 use rustc_hash::FxHashSet;
 
 use crate::{
+    fem,
     mesh::{Mesh, boundary::BoundaryFacet, visibility::SegmentCutter},
     model::{ModelError, Peridynamics, PointSource, bins::bin_of, point_cloud::PointCloud},
     parallel,
@@ -32,15 +33,21 @@ pub(crate) fn cut<const D: usize>(
         .as_ref()
         .map(|facets| SegmentCutter::new(mesh, facets));
     let cutter = cutter.filter(|cutter| !cutter.is_convex_around(position));
-    if barriers.is_empty() && cutter.is_none() {
+    // bodies that touch have no facet between them that a bond through a node would meet
+    let bodies = surface.as_ref().and_then(|_| bodies_of(mesh, position));
+    if barriers.is_empty() && cutter.is_none() && bodies.is_none() {
         return;
     }
     // a bond crosses a facet only if both of its ends are within its length of it
     let facets = surface.filter(|_| cutter.is_some());
     let bins = facets.map(|facets| NearBins::new(mesh, &facets, reach));
     let near: Vec<bool> = parallel::map_slice(position, |x| {
-        barriers.near(x, reach) || bins.as_ref().is_some_and(|b| b.contains(x))
+        bodies.is_some() || barriers.near(x, reach) || bins.as_ref().is_some_and(|b| b.contains(x))
     });
+    let is_apart = |i: usize, j: usize| {
+        let of = bodies.as_ref().map(|bodies| (bodies[i], bodies[j]));
+        matches!(of, Some((Some(a), Some(b))) if a != b)
+    };
     families.retain_of(
         |i| near[i],
         |i, j| {
@@ -49,9 +56,25 @@ pub(crate) fn cut<const D: usize>(
                 return true;
             }
             let (a, b) = (&position[i], &position[j]);
-            !barriers.cuts(a, b) && !cutter.as_ref().is_some_and(|c| c.cuts(a, b))
+            !is_apart(i, j)
+                && !barriers.cuts(a, b)
+                && !cutter.as_ref().is_some_and(|c| c.cuts(a, b))
         },
     );
+}
+
+/// The body of each position in the mesh; none of a mesh that is one body.
+fn bodies_of<const D: usize>(mesh: &Mesh<D>, position: &[Vector<D>]) -> Option<Vec<Option<u32>>> {
+    let of_node = mesh.bodies();
+    let of_cell = |c: usize| of_node[mesh.cell(c)[0] as usize];
+    if (0..mesh.cell_count()).all(|c| of_cell(c) == of_cell(0)) {
+        return None;
+    }
+    let cells = fem::Locator::new(mesh, 0..mesh.cell_count());
+    Some(parallel::map_slice(position, |x| {
+        let located = cells.locate(mesh, x, 1e-9);
+        located.map(|located| of_cell(located.cell))
+    }))
 }
 
 /// Bins of the size of a horizon in or beside which facets lie.

@@ -19,6 +19,7 @@
 //! | `field_evaluation.rs` | displacements and their gradients anywhere | |
 //! | `distribution.rs` | which of several processes has which sites | |
 //! | `shared_families.rs`, `shared_body.rs`, `held_families.rs` | families that are spread over processes | |
+//! | `clearance.rs` | sizes of sites, and how far the body extends beyond them | |
 //! | `crack_layers.rs` | area of cracks from the band of broken bonds | |
 //! | `bins.rs`, `zone_distance.rs` | positions in bins; distances to zones | |
 //!
@@ -26,6 +27,7 @@
 
 pub(crate) mod bins;
 pub(crate) mod bond_cutting;
+pub(crate) mod clearance;
 pub(crate) mod completed_lattice;
 pub(crate) mod continued_lattice;
 pub(crate) mod coupled_model;

@@ -2,13 +2,17 @@
 
 use rayon::prelude::*;
 
-use crate::{parallel, tensor::Vector};
+use crate::{
+    parallel,
+    shape::{Barrier, Barriers},
+    tensor::Vector,
+};
 
 /// Points per task; a constant, so that no result depends on the number of threads.
 const BLOCK: usize = 256;
 
 /// Points and parameters of the contact.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct ContactSetup<'a, const D: usize> {
     /// Positions at rest \[m\].
     pub position: &'a [Vector<D>],
@@ -18,12 +22,16 @@ pub struct ContactSetup<'a, const D: usize> {
     pub rows: &'a [bool],
     /// Spacing `h` of the points \[m\].
     pub spacing: f64,
-    /// Part of their distance at rest to which two points may approach each other; 0.9 in EMU and LAMMPS PERI.
+    /// Part of the spacing, or of their distance at rest where that is less, to which two points may approach each other; 0.9 of the distance at rest in EMU and LAMMPS PERI, and at most 1.35 spacings.
     pub approach: f64,
     /// `k`: points closer than `d` push each other with `k (d − r) V_i V_j` \[N/m^(2D+1)\]; see [`contact_stiffness`].
     pub stiffness: f64,
     /// Distance beyond `d` up to which pairs are kept on the list \[m\]. A quarter of the spacing is good.
     pub skin: f64,
+    /// Cracks whose faces keep points apart that lie within the `horizon` at rest: these do not push each other.
+    pub cracks: Vec<Barrier<D>>,
+    /// Horizon \[m\].
+    pub horizon: f64,
 }
 
 /// Error in the setup of contact.
@@ -58,8 +66,8 @@ pub fn contact_stiffness(bond_constant: f64, horizon: f64) -> f64 {
 
 /// The pairs that may touch, and their forces.
 ///
-/// The distance below which two points push each other is `d = min(0.9 |x_i − x_j|, 1.35 h)` as in EMU and LAMMPS PERI, so nothing pushes at rest.
-/// Differs from those by: pairs with an intact bond do not push, their bond does. Pairs come from a list that is rebuilt when some point has moved by half the skin;
+/// The distance below which two points push each other is `d = a min(|x_i − x_j|, h)` with the `approach` a, so nothing pushes at rest, and bodies touch where cells of their points do.
+/// Differs from EMU and LAMMPS PERI, whose distance is `min(0.9 |x_i − x_j|, 1.35 h)`, and in that pairs with an intact bond do not push, their bond does. Pairs come from a list that is rebuilt when some point has moved by half the skin;
 /// pairs beyond `d` add nothing, so results do not depend on when that was.
 pub struct Contact<const D: usize> {
     position: Vec<[f64; D]>,
@@ -69,6 +77,8 @@ pub struct Contact<const D: usize> {
     approach: f64,
     stiffness: f64,
     skin: f64,
+    cracks: Barriers<D>,
+    horizon: f64,
     /// Displacements for which the pairs were listed; empty before the first time.
     listed: Vec<f64>,
     offsets: Vec<usize>,
@@ -117,6 +127,8 @@ impl<const D: usize> Contact<D> {
             approach: setup.approach,
             stiffness: setup.stiffness,
             skin: setup.skin,
+            cracks: Barriers::new(setup.cracks.clone()),
+            horizon: setup.horizon,
             listed: Vec::new(),
             offsets: vec![0; points + 1],
             others: Vec::new(),
@@ -138,9 +150,17 @@ impl<const D: usize> Contact<D> {
         std::array::from_fn(|a| self.position[i][a] + u[i * D + a])
     }
 
+    /// Returns true if the faces of a crack keep two points apart.
+    fn are_faced(&self, i: usize, j: usize) -> bool {
+        !self.cracks.is_empty() && {
+            let (a, b) = (&self.position[i], &self.position[j]);
+            distance(a, b) <= self.horizon && self.cracks.cuts(&(*a).into(), &(*b).into())
+        }
+    }
+
     /// `d` of a pair.
     fn reach(&self, i: usize, j: usize) -> f64 {
-        (self.approach * distance(&self.position[i], &self.position[j])).min(1.35 * self.spacing)
+        self.approach * distance(&self.position[i], &self.position[j]).min(self.spacing)
     }
 
     /// Lists the pairs anew if a point has moved too far since.
@@ -166,7 +186,7 @@ impl<const D: usize> Contact<D> {
 
     /// Lists all pairs closer than `d` and the skin, by a grid of cells that wide.
     fn list(&mut self, u: &[f64]) {
-        let width = 1.35 * self.spacing + self.skin;
+        let width = self.approach * self.spacing + self.skin;
         let points = self.position.len();
         let y: Vec<[f64; D]> = (0..points).map(|i| self.at(u, i)).collect();
         let cell = |y: &[f64; D]| -> [i64; D] { y.map(|y| (y / width).floor() as i64) };
@@ -199,7 +219,10 @@ impl<const D: usize> Contact<D> {
                         break;
                     }
                     let k = *j as usize;
-                    if k != i && distance(&y[i], &y[k]) < self.reach(i, k) + self.skin {
+                    if k != i
+                        && distance(&y[i], &y[k]) < self.reach(i, k) + self.skin
+                        && !self.are_faced(i, k)
+                    {
                         others.push(*j);
                     }
                 }
@@ -333,6 +356,8 @@ mod tests {
             approach: 0.9,
             stiffness: 7.0,
             skin: 0.25 * H,
+            cracks: Vec::new(),
+            horizon: 0.0,
         })
         .unwrap()
     }
@@ -353,7 +378,7 @@ mod tests {
                 let mut expected = Vector::<3>::zeros();
                 for j in 0..x.len() {
                     let r = (y(j) - y(i)).norm();
-                    let d = (0.9 * (x[j] - x[i]).norm()).min(1.35 * H);
+                    let d = 0.9 * (x[j] - x[i]).norm().min(H);
                     if i != j && !bonded(i, j) && r < d {
                         expected += (y(j) - y(i)) / r * (7.0 * (d - r) * volume[i] * volume[j]);
                         energy += 0.25 * 7.0 * (d - r).powi(2) * volume[i] * volume[j];
@@ -427,6 +452,8 @@ mod tests {
             approach: 0.9,
             stiffness: 1.0,
             skin: 0.0,
+            cracks: Vec::new(),
+            horizon: 0.0,
         };
         let message = |s: &ContactSetup<'_, 3>| {
             Contact::new(s)

@@ -150,6 +150,7 @@ fn steps<const D: usize>(
         spec,
         moving: laid_out.moving,
         terms: Arc::clone(&laid_out.terms),
+        contact: laid_out.contact.clone(),
         proved: laid_out.proved,
         setup: &mut laid_out.setup,
     }

@@ -2,6 +2,7 @@
 
 #![deny(clippy::wildcard_enum_match_arm)]
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::model::Model;
@@ -41,8 +42,11 @@ impl ConditionTerms {
             };
             terms.each.push((condition.name.clone(), own));
         }
-        let rows = terms.each.iter().filter_map(|(_, term)| term.rows());
-        terms.rows = SpringRows::sum(D, rows);
+        let rows = terms.each.iter().filter_map(|(_, term)| term.rows(None));
+        let rows: Vec<Cow<'_, SpringRows>> = rows.collect();
+        let sum = SpringRows::sum(D, rows.iter().map(AsRef::as_ref));
+        drop(rows);
+        terms.rows = sum;
         Ok(terms)
     }
 

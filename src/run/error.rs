@@ -169,6 +169,16 @@ pub enum RunError {
         /// Position of the greatest depth.
         place: Vec<f64>,
     },
+    /// Surfaces lie in each other at time zero.
+    #[error(
+        "contact: surfaces lie in each other at time zero, by {depth:.4e} at ({}): move the bodies apart, or type contact.adjust = {depth:.1e} or more, for surfaces that just touch there", place.iter().map(|x| format!("{x:.4e}")).collect::<Vec<_>>().join(", ")
+    )]
+    SurfacesOverlap {
+        /// Depth \[m\].
+        depth: f64,
+        /// Position of the greatest depth.
+        place: Vec<f64>,
+    },
     /// A condition meets no site.
     #[error("the condition `{condition}` meets no site of the model; {remedy}")]
     Idle {

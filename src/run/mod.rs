@@ -11,6 +11,7 @@
 //! | `loads.rs` | which sites conditions hold, and the force that each site takes |
 //! | `proof/` | checks of a model before it is solved |
 //! | `equilibrium.rs`, `solution.rs` | assembly, conditions and solution of a static system |
+//! | `static_contact.rs` | surfaces and faces of cracks that press on each other in a static scene |
 //! | `statics.rs`, `motion/` | the sequence of a static run; scenes in time and load steps, checkpoints |
 //! | `results.rs` | a solution that a program keeps: fields and tables by name |
 //! | `intact.rs` | bonds between points that stand |
@@ -61,6 +62,7 @@ mod sections;
 pub mod setup;
 pub mod solution;
 mod solution_samples;
+mod static_contact;
 pub(crate) mod statics;
 mod stress_settings;
 mod stresses;

@@ -17,6 +17,7 @@ use crate::scene::failure::Breaking;
 use crate::scene::impactors::Impactor;
 use crate::scene::initial::Initial;
 use crate::scene::materials::{Material, Ratio};
+use crate::scene::solve::Solve;
 use crate::scene::spec::{CouplingTraits, ElementsSpec};
 use crate::scene::validated::{Output, Scene, Solver};
 use crate::system::Ranks;
@@ -48,6 +49,8 @@ pub struct RunSettings<const D: usize> {
     pub impactors: Vec<Impactor<D>>,
     /// Failure of bonds.
     pub breaking: Breaking<D>,
+    /// True for a scene in time.
+    pub is_in_time: bool,
     /// Poisson's ratio of the points.
     pub ratio: Ratio,
     /// Rule by which the nonlocal zone follows damage, where it does.
@@ -216,6 +219,7 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
             output: scene.output,
             initial: scene.initial,
             impactors: scene.impactors,
+            is_in_time: matches!(scene.solve, Solve::Explicit(_)),
             breaking: scene.breaking,
             ratio,
             follow: scene.follow,

@@ -8,6 +8,7 @@ use super::rotation::Rotations;
 use super::sections::Sections;
 use super::setup::{RunSettings, model_choices, problem, same_everywhere, shared_model, sizes};
 use super::solution::{Moved, Solved, zone_of_site};
+use super::static_contact::with_contact;
 use super::zone_placement::{CachedSolution, difference_from_elements};
 use crate::run::placed_scene::PlacedScene;
 use std::path::PathBuf;
@@ -104,6 +105,7 @@ fn solve_over<const D: usize>(
 }
 
 /// Lays out, proves, solves and summarises a static scene whose mesh and zones are known.
+// One function: the stages of a static scene, in the order in which it passes them.
 fn solve_chosen<const D: usize>(
     scene: Scene<D>,
     kept: Option<Arc<CachedSolution<D>>>,
@@ -133,7 +135,7 @@ fn solve_chosen<const D: usize>(
     let rows = (model, &operator, ranks);
     definiteness::check(rows, rest.ratio, &mut choices, progress)?;
     watch.lap(&mut timings, "assembly");
-    let mut system = motion::dynamic_system::still(model, coupling, &operator, &rest)?;
+    let mut system = motion::dynamic_system::still(model, coupling, &operator, &rest, false)?;
     let body = StaticBody {
         model,
         coupling,
@@ -154,6 +156,13 @@ fn solve_chosen<const D: usize>(
             (&computed, proof)
         }
     };
+    let told = (&mut timings, &mut choices);
+    let apart = with_contact((&body.input(), &rest), equilibrium, told, progress)?;
+    let equilibrium = apart.equilibrium.as_ref().unwrap_or(equilibrium);
+    let system = match apart.equilibrium {
+        Some(_) => system.and(apart.system),
+        None => system,
+    };
     watch = Stopwatch::start();
     choices.extend(body.told(equilibrium));
     let residual = equilibrium.residual();
@@ -172,7 +181,7 @@ fn solve_chosen<const D: usize>(
     let files = visit(&rest.output, &solved)?;
     watch.lap(&mut timings, "output");
     progress.finish();
-    Ok(RunSummary {
+    let mut summary = RunSummary {
         scene: name,
         sizes: body.sizes(counts, equilibrium.solution.info.matrix_nnz),
         choices,
@@ -182,7 +191,9 @@ fn solve_chosen<const D: usize>(
         files,
         sections,
         ..body.summary(equilibrium, traits, proof)?
-    })
+    };
+    summary.warnings.extend(apart.warning);
+    Ok(summary)
 }
 
 /// The model of a static scene; collective, with its families spread over processes where they can be.
@@ -210,7 +221,7 @@ pub(crate) struct StaticBody<'a, const D: usize> {
     pub has_exact_seam: bool,
 }
 
-impl<const D: usize> StaticBody<'_, D> {
+impl<'a, const D: usize> StaticBody<'a, D> {
     /// Proves a model by its stiffness before it is solved; returns the proof, and its seconds.
     ///
     /// # Errors
@@ -259,6 +270,20 @@ impl<const D: usize> StaticBody<'_, D> {
         Ok(proof)
     }
 
+    /// The model under its conditions.
+    fn input(&self) -> StaticInput<'a, D> {
+        StaticInput {
+            model: self.model,
+            coupling: self.coupling,
+            operator: self.operator,
+            conditions: &self.rest.conditions,
+            solver: &self.rest.solver,
+            time: 0.0,
+            ranks: self.ranks,
+            thermal: self.rest.stresses.thermal.as_ref(),
+        }
+    }
+
     /// Assembles, proves and solves; `system` has the forces that are not linear, if any are not.
     ///
     /// # Errors
@@ -275,22 +300,7 @@ impl<const D: usize> StaticBody<'_, D> {
             proof = found;
             Ok(seconds)
         };
-        let solved = equilibrium(
-            &StaticInput {
-                model: self.model,
-                coupling: self.coupling,
-                operator: self.operator,
-                conditions: &self.rest.conditions,
-                solver: &self.rest.solver,
-                time: 0.0,
-                ranks: self.ranks,
-                thermal: self.rest.stresses.thermal.as_ref(),
-            },
-            system,
-            Timings::default(),
-            prove,
-            progress,
-        )?;
+        let solved = equilibrium(&self.input(), system, Timings::default(), prove, progress)?;
         solved.timings.add_to(timings);
         Ok((solved, proof))
     }

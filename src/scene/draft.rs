@@ -74,7 +74,9 @@ impl<'a, const D: usize> Draft<'a, D> {
         let kinematics = *spec.kinematics.get_ref();
         let solver = solver(spec)?;
         table_rows::read_files(&spec.tables, directory, &mut fingerprint)?;
-        let mesh = meshing::build::<D>(&spec.mesh, directory, &spec.kinematics.span())?;
+        let may_touch = spec.contact.is_some();
+        let label = spec.kinematics.span();
+        let mesh = meshing::build::<D>(&spec.mesh, directory, &label, may_touch)?;
         let influence = match spec
             .peridynamics
             .as_ref()

@@ -6,6 +6,7 @@ use super::material_interfaces::MaterialInterface;
 use super::materials::Material;
 use super::region::{Region, region};
 use super::spec::{CalibrationSpec, ContactSpec, EdgeSpec, SceneSpec, SolveSpec};
+use super::value::Number;
 use crate::coupling::semidiscrete::behaviour::ContactBehaviour;
 use crate::mesh::Mesh;
 use crate::peridynamics::BondWeights;
@@ -305,16 +306,22 @@ fn contact(spec: &ContactSpec) -> Result<ContactBehaviour, SceneError> {
             r,
             r.value > 0.0 && r.value <= 1.0,
             "must be positive and at most 1",
-            "0.9 suits most scenes; beyond 1 neighbours at rest would repel each other",
+            "with 1 points touch when their cells do; beyond it neighbours at rest would repel each other",
         )?,
-        None => 0.9,
+        None => 1.0,
     };
     let stiffness = match &spec.stiffness_factor {
         Some(s) => bounds_checks::positive("contact.stiffness-factor", s)?,
         None => 15.0,
     };
+    let not_negative = |key: &str, number: &Option<Number>| {
+        let of = number.as_ref();
+        of.map_or(Ok(0.0), |number| bounds_checks::not_negative(key, number))
+    };
     Ok(ContactBehaviour {
         approach,
         stiffness,
+        friction: not_negative("contact.friction", &spec.friction)?,
+        adjust: not_negative("contact.adjust", &spec.adjust)?,
     })
 }

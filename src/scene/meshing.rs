@@ -20,7 +20,11 @@ use crate::observe::checkpoint::Fingerprint;
 const MOST_CELLS: f64 = 1e8;
 
 /// A mesh that is read from a file, or that the scene was given in memory.
-fn from_file<const D: usize>(file: &FileMeshSpec, directory: &Path) -> Result<Mesh<D>, SceneError> {
+fn from_file<const D: usize>(
+    file: &FileMeshSpec,
+    directory: &Path,
+    may_touch: bool,
+) -> Result<Mesh<D>, SceneError> {
     let path = directory.join(&file.path.value);
     let failed = |error: MeshError| {
         let told = SceneError::mesh(format!("`mesh.file.path`: {error}"))
@@ -41,7 +45,7 @@ fn from_file<const D: usize>(file: &FileMeshSpec, directory: &Path) -> Result<Me
         })?,
         None => {
             let mesh = read::read_of(&path, file.order).map_err(failed)?;
-            quality::check(&mesh).map_err(failed)?;
+            quality::check_bodies(&mesh, may_touch).map_err(failed)?;
             mesh
         }
     };
@@ -80,6 +84,7 @@ pub(crate) fn build<const D: usize>(
     spec: &MeshSpec,
     directory: &Path,
     kinematics: &Span,
+    may_touch: bool,
 ) -> Result<Mesh<D>, SceneError> {
     let dimension = |wanted: usize, name: &str, min: &Coordinates| {
         if wanted == D {
@@ -134,7 +139,7 @@ pub(crate) fn build<const D: usize>(
             )?;
             if is_raised { raised(mesh) } else { mesh }
         }
-        MeshSpec::File(file) => from_file(file, directory)?,
+        MeshSpec::File(file) => from_file(file, directory, may_touch)?,
     };
     can_be_computed_with(&mesh)?;
     if !matches!(spec, MeshSpec::File(_)) {

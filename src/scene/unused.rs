@@ -105,9 +105,6 @@ impl<const D: usize> Parts<'_, D> {
                 ));
             }
         }
-        if self.spec.contact.is_some() {
-            list.push("`contact` is not used: points touch, and the body is all finite elements, which pass through each other".to_owned());
-        }
         let regions = self.spec.no_fail.keys();
         list.extend(regions.map(|name| {
             format!("the region `no-fail.{name}` is not used: it keeps bonds and the damage of points, and the body is all finite elements")

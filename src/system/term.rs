@@ -1,5 +1,7 @@
 //! Force terms beside those of the body: `f(u) = F_body(u) + Σ F_k(u)`.
 
+use std::borrow::Cow;
+
 use super::{Interval, SpringRows};
 
 /// Upper bounds of the part that a term, or all forces of a system, may add to the eigenvalues of the motion.
@@ -23,8 +25,8 @@ pub trait ForceTerm: Send + Sync {
     /// [`ForceTerm::commit`]: velocities are those of then.
     fn add_force(&self, u: &[f64], force: &mut [f64], interval: Interval);
 
-    /// Its tangent at rest; none if it vanishes there.
-    fn rows(&self) -> Option<&SpringRows>;
+    /// Its tangent at rest, none if it vanishes there; `at` a displacement what it has beyond that, symmetric and without negative energies, none if that is nothing or has to be differenced.
+    fn rows(&self, at: Option<&[f64]>) -> Option<Cow<'_, SpringRows>>;
 
     /// Adds an upper bound of `Σ_b |K_ab|`, contact included, to the `sums` of the body's unknowns, and appends those of its own.
     fn add_row_sums(&self, sums: &mut Vec<f64>);
@@ -63,8 +65,8 @@ impl ForceTerm for SpringRows {
         self.add_product(u, force);
     }
 
-    fn rows(&self) -> Option<&SpringRows> {
-        Some(self)
+    fn rows(&self, at: Option<&[f64]>) -> Option<Cow<'_, SpringRows>> {
+        at.is_none().then_some(Cow::Borrowed(self))
     }
 
     fn add_row_sums(&self, sums: &mut Vec<f64>) {

@@ -2,6 +2,7 @@
 
 use std::ops::DerefMut;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::{
     BlockCsr, BodyHistory, BodyState, BondChanges, Dissipation, ElementTangent, FailureUpdate,
@@ -15,6 +16,8 @@ pub struct WithTerms<'t, S> {
     mass: Vec<f64>,
     /// Unknowns of the body.
     dofs: usize,
+    /// True for each term that gave its tangent when asked last.
+    known: Vec<AtomicBool>,
     /// Displacement and interval of the last force; none if no term has a history.
     last: Option<(Vec<f64>, Interval)>,
 }
@@ -33,6 +36,7 @@ where
             last: (terms.iter())
                 .any(|term| term.dissipated().is_some() || !term.state().is_empty())
                 .then(|| (Vec::new(), Interval::AT_ONCE)),
+            known: terms.iter().map(|_| AtomicBool::new(false)).collect(),
             body,
             terms,
         }
@@ -94,7 +98,12 @@ where
         let (own, rest) = force.split_at_mut(self.dofs);
         rest.fill(0.0);
         (self.body).force_beside_elements_into(&u[..self.dofs], own, interval);
-        self.add_terms(u, force, interval);
+        // what gave its tangent with those of elements is not differenced
+        for (term, known) in self.terms.iter().zip(&self.known) {
+            if !known.load(Ordering::Relaxed) {
+                term.add_force(u, force, interval);
+            }
+        }
     }
 
     fn take_heat_work(&mut self) -> f64 {
@@ -163,7 +172,7 @@ where
         let (own, rest) = y.split_at_mut(self.dofs);
         rest.fill(0.0);
         self.body.tangent_into(self.own(x), own);
-        for rows in self.terms.iter().filter_map(|term| term.rows()) {
+        for rows in self.terms.iter().filter_map(|term| term.rows(None)) {
             rows.add_product(x, y);
         }
     }
@@ -192,7 +201,7 @@ where
     }
 
     fn tangent_rows(&self, sites: &[u32]) -> BlockCsr {
-        let rows = self.terms.iter().filter_map(|term| term.rows());
+        let rows = self.terms.iter().filter_map(|term| term.rows(None));
         rows.fold(self.body.tangent_rows(sites), |sum, rows| {
             rows.added(&sum, sites)
         })
@@ -211,12 +220,33 @@ where
     }
 
     fn element_tangent(&self, u: &[f64], interval: Interval) -> Option<ElementTangent> {
-        let mut found = self.body.element_tangent(self.own(u), interval)?;
-        // own sites are no nodes; what is not linear is differenced
+        let of_terms: Vec<_> = self.terms.iter().map(|t| t.rows(Some(u))).collect();
+        for (known, rows) in self.known.iter().zip(&of_terms) {
+            known.store(rows.is_some(), Ordering::Relaxed);
+        }
+        let of_body = self.body.element_tangent(self.own(u), interval);
+        if of_body.is_none() && of_terms.iter().all(Option::is_none) {
+            return None;
+        }
+        let mut found = of_body.unwrap_or_else(|| ElementTangent {
+            excess: BlockCsr {
+                block: self.body.block(),
+                row_offsets: vec![0],
+                ..BlockCsr::default()
+            },
+            symmetry: Symmetry::Symmetric,
+            is_whole: self.body.difference_length().is_none(),
+        });
+        // own sites are no nodes
         let end = found.excess.columns.len();
         found.excess.row_offsets.resize(self.mass.len() + 1, end);
-        let is_linear = |t: &Arc<dyn ForceTerm + '_>| t.difference_length().is_none();
-        found.is_whole &= self.terms.iter().all(is_linear);
+        let is_known = |(term, rows): (&Arc<dyn ForceTerm + '_>, &Option<_>)| {
+            term.difference_length().is_none() || rows.is_some()
+        };
+        found.is_whole &= self.terms.iter().zip(&of_terms).all(is_known);
+        for rows in of_terms.into_iter().flatten() {
+            rows.add_to(&mut found.excess);
+        }
         Some(found)
     }
 }
@@ -326,7 +356,7 @@ mod tests {
             force[0] += self.read().len() as f64;
         }
 
-        fn rows(&self) -> Option<&SpringRows> {
+        fn rows(&self, _at: Option<&[f64]>) -> Option<std::borrow::Cow<'_, SpringRows>> {
             None
         }
 

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use imports::{Imports, ItemPath};
 
 /// Modules of the library and, above them, the other crates, the lowest first.
-const FLOORS: [&str; 26] = [
+const FLOORS: [&str; 27] = [
     "dimension",
     "tensor",
     "parallel",
@@ -25,6 +25,7 @@ const FLOORS: [&str; 26] = [
     "peridynamics",
     "observe",
     "model",
+    "contact",
     "coupling",
     "scene",
     "run",

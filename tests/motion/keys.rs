@@ -238,7 +238,7 @@ fn every_key_says_what_is_wrong_with_it() {
             "[contact]\nradius-factor = 1.5\n[output]",
             WrongValue,
             "radius-factor` is 1.5",
-            "0.9",
+            "neighbours at rest",
         ),
         (
             BREAKING,

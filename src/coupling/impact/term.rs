@@ -2,6 +2,8 @@
 //!
 //! At rest nothing touches: the tangent is that of the body, and contact enters the stable step by its bound of frequencies.
 
+use std::borrow::Cow;
+
 use super::Impact;
 use crate::system::{ForceTerm, Interval, RateBounds, SpringRows};
 
@@ -17,7 +19,7 @@ impl<const D: usize> ForceTerm for Impact<D> {
         Impact::add_force(self, u, force);
     }
 
-    fn rows(&self) -> Option<&SpringRows> {
+    fn rows(&self, _at: Option<&[f64]>) -> Option<Cow<'_, SpringRows>> {
         None
     }
 

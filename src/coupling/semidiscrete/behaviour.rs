@@ -128,13 +128,17 @@ impl BondThreshold {
     }
 }
 
-/// Short-range contact of points that no bond joins.
+/// Contact of points that no bond joins, and of surfaces of elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactBehaviour {
-    /// Part of their distance at rest to which two points may approach each other.
+    /// Part of the spacing, or of their distance at rest, to which two points may approach each other.
     pub approach: f64,
     /// Stiffness of the repulsion relative to a bond as long as the horizon; 15 in EMU.
     pub stiffness: f64,
+    /// Coefficient of friction on surfaces of elements.
+    pub friction: f64,
+    /// Distance up to which surfaces that are apart or overlap at time zero count as touching \[m\].
+    pub adjust: f64,
 }
 
 /// Reasons why a model cannot move bond by bond.

@@ -20,6 +20,7 @@ use crate::{
         bond_force::{BondKinematics, BondPass},
         contact::{Contact, ContactSetup, contact_stiffness},
     },
+    shape::Barrier,
     system::{BondChanges, FailureUpdate, Interval, Ranks},
     tensor::Vector,
 };
@@ -62,8 +63,9 @@ fn contact_of<const D: usize>(
     behaviour: &BondBehaviour<'_, D>,
     body: &PdBody<D>,
     own_row: &[bool],
-    spacing: f64,
+    (spacing, barriers): (f64, &[Barrier<D>]),
 ) -> Result<Option<Mutex<Contact<D>>>, SystemError> {
+    let is_crack = |b: &&Barrier<D>| matches!(b, Barrier::Crack(_));
     let contact = match behaviour.contact {
         Some(c) => Some(Mutex::new(Contact::new(&ContactSetup {
             position: &body.cloud.position,
@@ -73,6 +75,8 @@ fn contact_of<const D: usize>(
             approach: c.approach,
             stiffness: c.stiffness / 15.0 * stiffest_contact(body),
             skin: 0.25 * spacing,
+            cracks: barriers.iter().filter(is_crack).cloned().collect(),
+            horizon: body.cloud.horizon.largest(),
         })?)),
         None => None,
     };
@@ -136,7 +140,7 @@ impl<const D: usize> MovingBody<D> {
         .pass()?;
         let known = (model.peridynamic_material(), p.law.name());
         let heat = PointHeat::of(behaviour.heat.as_ref(), body, known, pass.as_mut())?;
-        let contact = contact_of(behaviour, body, &own_row, model.spacing())?;
+        let contact = contact_of(behaviour, body, &own_row, (model.spacing(), &p.barriers))?;
         let asks = |i: usize| families.of(i).iter().any(|&j| !is_site[j as usize]);
         let is_asked = contact.is_some() || (0..points).any(|i| is_site[i] && asks(i));
         let shift = shift_of(&site_of_point);

@@ -359,7 +359,7 @@ fn assembled<'a, const D: usize>(
     }
 }
 
-/// The system of a static scene whose forces are not linear, by its law or its exact bonds; none where they are.
+/// The system of a static scene whose forces are not linear, by its law or its exact bonds; none where they are, unless it is `asked_for`.
 ///
 /// # Errors
 /// [`RunError::System`] for bonds that cannot stretch.
@@ -368,9 +368,10 @@ pub(crate) fn still<'a, const D: usize>(
     coupling: &dyn Coupling<D>,
     operator: &Operator<'_, D>,
     rest: &RunSettings<D>,
+    asked_for: bool,
 ) -> Result<Option<CoupledSystem<'a, D>>, RunError> {
     let kinematics = rest.kinematics();
-    if rest.nonlinear(model).is_none() {
+    if !asked_for && rest.nonlinear(model).is_none() {
         return Ok(None);
     }
     let behaviour = BondBehaviour {

@@ -2,6 +2,7 @@
 
 use super::RunOptions;
 use super::breaks::{Breaks, breaks};
+use super::contact::ContactRecord;
 use super::dynamic_system::{LayoutStart, PlaneEnergy, plane_energy};
 use super::guard::{Balance, energies_are_apart};
 use super::impact_record::ImpactRecord;
@@ -134,6 +135,7 @@ fn balance_of<const D: usize>(
     }
     let points = model.peridynamics.as_ref();
     let follows_law = !rest.impactors.is_empty()
+        || rest.breaking.contact.is_some()
         || rest.has_nonlinear_elements(model)
         || points.is_some_and(|p| !p.law.is_linear() && p.law.accelerator().is_none());
     match is_proved {
@@ -168,6 +170,7 @@ fn run_segment<'r, const D: usize>(
         spec,
         moving: laid_out.moving,
         terms: laid_out.terms,
+        contact: laid_out.contact,
         proved,
         setup: &mut record.setup,
     };
@@ -281,13 +284,9 @@ impl SegmentRecord {
         told.extend(rotation.as_ref().map(Rotation::warning));
         told.extend(observer.guard.passed(motion.state().time));
         told.extend(observer.steep.iter().cloned());
-        told.extend(
-            observer
-                .recorder
-                .impact
-                .iter()
-                .flat_map(ImpactRecord::warnings),
-        );
+        let recorder = &observer.recorder;
+        told.extend(recorder.impact.iter().flat_map(ImpactRecord::warnings));
+        told.extend(recorder.contact.iter().flat_map(ContactRecord::warnings));
         let files = observer.recorder.files();
         let reactions = observer.recorder.reactions();
         let sections = observer.recorder.section_forces();

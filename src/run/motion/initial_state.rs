@@ -13,6 +13,7 @@ use super::setup::{RunSetup, recorder, restore};
 use super::time_dependent_loads::SceneDrive;
 use super::time_step::{held, paced, repaced};
 use super::writer::Recorder;
+use crate::contact::SurfaceContact;
 use crate::coupling::impact::RESOLVED;
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::proof::Part;
@@ -83,6 +84,8 @@ pub(crate) struct PreStep<'a, 'r, 'm, const D: usize> {
     pub moving: DynamicSystem<'m>,
     /// Springs that hold the body.
     pub terms: Arc<ConditionTerms>,
+    /// Contact of surfaces, if there is any.
+    pub contact: Option<Arc<SurfaceContact<D>>>,
     /// Evidence that none does, if there is any.
     pub proved: Option<&'static str>,
     pub setup: &'a mut RunSetup,
@@ -135,13 +138,10 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         }
         restore(moving.system.as_mut(), saved.as_ref(), &file)?;
         let written = saved.as_ref().map(|s| &s.written);
-        let of = (
-            impact,
-            breaks(moving.system.as_ref(), rest),
-            moving.is_linear,
-        );
+        let of = (breaks(moving.system.as_ref(), rest), moving.is_linear);
+        let touches = (impact, self.contact);
         let every = (options, spec.checkpoint_every);
-        let mut recorder = recorder((model, rest), every, of, file, written)?;
+        let mut recorder = recorder((model, rest), every, touches, of, file, written)?;
         recorder.hold(drive.holders());
         recorder.cut(model, rest, self.terms)?;
         let resumed = saved.is_some();
@@ -203,6 +203,9 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         let drive = driven(model, rest, &begin.u, &pace, spec)?;
         let (state, switch) = leaving.arrive(model, system, &drive)?;
         recorder.move_to(&Sampler::new(model));
+        if let (Some(record), Some(contact)) = (&mut recorder.contact, self.contact) {
+            record.move_to(contact);
+        }
         recorder.hold(drive.holders());
         recorder.cut(model, rest, self.terms)?;
         recorder.energy_at_start += switch.left();

@@ -13,6 +13,7 @@
 //! | `quasi_static.rs`, `inside_step.rs`, `doubtful_equilibria.rs` | the run under a load that grows; progress within a step; doubts about its equilibria |
 //! | `newton_factors.rs`, `spread_factors.rs` | the factors or multigrid that precondition it, of one process or of several |
 //! | `time_step.rs` | the time step, with sub-cycling |
+//! | `contact.rs` | contact of surfaces, and its record |
 //! | `impact.rs`, `driven_impactors.rs`, `impact_record.rs` | rigid impactors: contact, prescribed motion, record |
 //! | `way.rs` | the displacement by a prescribed velocity |
 //! | `guard.rs`, `seen.rs` | monitoring of energy, rotation of elements and strains |
@@ -29,6 +30,7 @@
 
 pub(crate) mod bounding_boxes;
 pub mod breaks;
+pub(crate) mod contact;
 mod crack_growth;
 mod created_energy;
 mod doubtful_equilibria;

@@ -121,7 +121,8 @@ impl NewtonFactors {
             ),
         });
         // impactors are no sites of the stiffness
-        let changes = rest.has_nonlinear_elements(model) || rest.breaking.breaks();
+        let touches = rest.breaking.contact.is_some();
+        let changes = touches || rest.has_nonlinear_elements(model) || rest.breaking.breaks();
         let is_kept = changes && rest.impactors.is_empty();
         Ok(Some(Self {
             stiffness: is_kept.then_some(stiffness),

@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use super::RunOptions;
 use super::breaks::{Breaks, breaks, damage_at_edge};
+use super::contact::ContactRecord;
 use super::created_energy::{created_energy, set_free};
 use super::doubtful_equilibria::DoubtfulEquilibria;
 use super::dynamic_system::{failing_stretch, start};
@@ -115,8 +116,8 @@ fn load_steps<const D: usize>(
     let breaks = breaks(system.as_ref(), rest);
     let every = spec.checkpoint_every;
     let written = at.map(|saved| &saved.written);
-    let of = (impact, breaks, false);
-    let mut recorder = recorder((model, rest), (*options, every), of, file, written)?;
+    let (of, touches) = ((breaks, false), (impact, laid_out.contact));
+    let mut recorder = recorder((model, rest), (*options, every), touches, of, file, written)?;
     recorder.hold(drive.holders());
     recorder.cut(model, rest, Arc::clone(&laid_out.terms))?;
     let (edge, seen) = at.map_or_else(Default::default, |s| (s.edge, s.seen.clone()));
@@ -506,6 +507,12 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         Ok(RunSummary {
             warnings: warnings
                 .chain(impacts.flat_map(ImpactRecord::warnings))
+                .chain(
+                    self.recorder
+                        .contact
+                        .iter()
+                        .flat_map(ContactRecord::warnings),
+                )
                 .chain(match self.energies_are_apart {
                     true => None,
                     false => created_energy(model, &motion, &state.u),

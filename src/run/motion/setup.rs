@@ -1,6 +1,7 @@
 //! Set-up of every run in time or in load steps: the model, its rows and bonds, and the checkpoint that it goes on from.
 
 use super::breaks::Breaks;
+use super::contact::{ContactRecord, touching};
 use super::dynamic_system::{DynamicSystem, LayoutStart, dynamic};
 use super::guard::energies_are_apart;
 use super::impact_record::ImpactRecord;
@@ -23,6 +24,7 @@ use crate::scene::spec::CouplingTraits;
 use crate::scene::validated::Scene;
 use crate::system::{Ranks, SemiDiscrete, WithTerms};
 use crate::{
+    contact::SurfaceContact,
     coupling::{Impact, Operator, Problem},
     model::{Model, Sampler},
 };
@@ -43,6 +45,8 @@ pub struct ModelSetup<'a, const D: usize> {
     pub moving: DynamicSystem<'a>,
     /// Springs that hold the body; the system has them.
     pub(crate) terms: Arc<ConditionTerms>,
+    /// Contact of surfaces, if there is any; the system has it.
+    pub(crate) contact: Option<Arc<SurfaceContact<D>>>,
     /// Results of the proof of the model.
     pub proof: Proof,
     /// Memory that the program held when sites and bonds were there.
@@ -141,6 +145,7 @@ pub(crate) fn lay_out<const D: usize, T>(
     if !terms.is_empty() {
         moving.system = Box::new(WithTerms::new(moving.system, terms.all()));
     }
+    let (moving, contact) = touching(&model, rest, moving, &mut run.choices)?;
     let done = then(ModelSetup {
         setup: run,
         proved,
@@ -149,6 +154,7 @@ pub(crate) fn lay_out<const D: usize, T>(
         rest,
         moving,
         terms: Arc::clone(&terms),
+        contact,
         proof,
         bytes,
     })?;
@@ -212,7 +218,8 @@ pub(crate) fn opened<const D: usize>(
 pub(crate) fn recorder<'a, const D: usize>(
     (model, rest): (&Model<D>, &'a RunSettings<D>),
     (options, typed): (RunOptions<'a>, Option<Pace>),
-    (impact, breaks, is_linear): (Option<Arc<Impact<D>>>, Breaks, bool),
+    (impact, contact): (Option<Arc<Impact<D>>>, Option<Arc<SurfaceContact<D>>>),
+    (breaks, is_linear): (Breaks, bool),
     file: CheckpointFile,
     written: Option<&Written>,
 ) -> Result<Recorder<'a, D>, ObserveError> {
@@ -222,6 +229,7 @@ pub(crate) fn recorder<'a, const D: usize>(
         &rest.conditions,
         &Sampler::new(model),
         impact.map(|impact| ImpactRecord::new(impact, &rest.impactors, peaks)),
+        contact.map(ContactRecord::new),
         breaks,
         is_linear,
         file,

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use super::RunOptions;
 use super::breaks::Breaks;
+use super::contact::ContactRecord;
 use super::crack_growth::CrackGrowth;
 use super::impact_record::ImpactRecord;
 use super::probe_rows::ProbeRows;
@@ -115,6 +116,8 @@ pub struct Recorder<'a, const D: usize> {
     sections: SectionRows<'a, D>,
     /// Record of impactors, if there are any.
     pub impact: Option<ImpactRecord<D>>,
+    /// Record of the contact of surfaces, if there is any.
+    pub contact: Option<ContactRecord<D>>,
     breaks: Breaks,
     history: CsvTable,
     tables: Tables,
@@ -145,6 +148,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         conditions: &[Condition<D>],
         sampler: &Sampler<'_, D>,
         impact: Option<ImpactRecord<D>>,
+        contact: Option<ContactRecord<D>>,
         breaks: Breaks,
         is_linear: bool,
         checkpoint: CheckpointFile,
@@ -158,6 +162,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         header.extend(sections.header());
         header.extend(field_probes::header(output));
         header.extend(impact.iter().flat_map(ImpactRecord::header));
+        header.extend(contact.iter().flat_map(ContactRecord::header));
         let begun = files_begun(output, header, &checkpoint, &options, written);
         let begun = agreed(options.ranks, begun, &output.directory);
         let (history, tables, series) = begun?;
@@ -167,6 +172,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             supports,
             sections,
             impact,
+            contact,
             breaks,
             history,
             tables,
@@ -309,6 +315,12 @@ impl<'a, const D: usize> Recorder<'a, D> {
             .iter()
             .flat_map(|impact| impact.row(state, moment.supports.0));
         row.extend(impact.map(Entry::from));
+        let contact = self.contact.iter_mut();
+        row.extend(
+            contact
+                .flat_map(|contact| contact.row(state))
+                .map(Entry::from),
+        );
         self.options.keep("history", &mut self.history, &row)?;
         let may_be_damaged = state.broken > 0 || self.breaks == Breaks::Gradually;
         self.tables.tips(

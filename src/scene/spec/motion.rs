@@ -175,14 +175,18 @@ pub enum CalibrationSpec {
     Continuum,
 }
 
-/// Short-range repulsion of points that share no bond: of two bodies, or of the faces of a crack.
+/// Contact of bodies, of the faces of a crack, and of fragments: surfaces of elements and points keep out of each other.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ContactSpec {
-    /// Part of their distance at rest below which two points without a bond repel each other, never more than 1.35 spacings; 0.9 if left out.
+    /// Distance below which two points without a bond repel each other, over the spacing, or over their distance at rest where that is less; 1 if left out: their cells touch.
     pub radius_factor: Option<Number>,
-    /// Stiffness of the repulsion over that of a bond as long as the horizon; 15 if left out.
+    /// Stiffness of the repulsion of points over that of a bond as long as the horizon; 15 if left out. That of surfaces of elements is in proportion.
     pub stiffness_factor: Option<Number>,
+    /// Coefficient of friction on surfaces of elements; 0 if left out.
+    pub friction: Option<Number>,
+    /// Distance up to which surfaces that are apart or overlap at time zero count as touching \[m\]; 0 if left out.
+    pub adjust: Option<Number>,
 }
 
 /// The tip of a crack: the farthest damaged point along a direction.

@@ -8,7 +8,7 @@ use crate::shape::{Shape, distance_to_segment};
 use crate::tensor::Vector;
 
 /// The size of every site \[m\]: the edge of a point's whole cell, or the shortest edge of the cells around a node, half of it where they have nodes in the middle.
-pub(super) fn sizes<const D: usize>(model: &Model<D>) -> Vec<f64> {
+pub(crate) fn sizes<const D: usize>(model: &Model<D>) -> Vec<f64> {
     let whole = whole_cells(model);
     let of_site = |site: usize| match model.point_of(site) {
         Some((body, p)) => {
@@ -60,7 +60,7 @@ fn shortest_edge<const D: usize>(model: &Model<D>, site: usize) -> f64 {
 const FIRST_LAYER: f64 = 1.0 - 1e-6;
 
 /// Returns the distance by which the body extends beyond every site \[m\]: zero at a node, and negative at one of the rim of a zone that lies outside of the body. A point of the first layer reaches to the surface of the mesh, any other half of its size.
-pub(super) fn clearances<const D: usize>(model: &Model<D>, sizes: &[f64]) -> Vec<f64> {
+pub(crate) fn clearances<const D: usize>(model: &Model<D>, sizes: &[f64]) -> Vec<f64> {
     let mesh = &model.mesh;
     let mut of_cut: FxHashSet<u32> = FxHashSet::default();
     for &c in mesh.embedded.pieces.keys() {
