@@ -1,5 +1,7 @@
 //! Two bodies that collide.
 
+use std::f64::consts::PI;
+
 use crate::{bondline, column, resumes_with_the_same_bytes, run, write};
 
 /// A strip cut in two; its left half runs into the right one.
@@ -260,16 +262,18 @@ fn bar(name: &'static str, cells: usize, from: f64, to: f64) -> Part {
 }
 
 /// A rectangle of so many cells along its sides, with its top and its bottom.
-fn block(name: &'static str, [n, m]: [usize; 2], low: [f64; 2], high: [f64; 2]) -> Part {
+fn block(name: &'static str, cells: [usize; 2], low: [f64; 2], high: [f64; 2]) -> Part {
+    let at = |k: usize, s: f64| low[k] + (high[k] - low[k]) * s;
+    mapped(name, cells, |s, t| [at(0, s), at(1, t)])
+}
+
+/// A body of so many cells along the sides of a unit square, whose places `map` says.
+fn mapped(name: &'static str, [n, m]: [usize; 2], map: impl Fn(f64, f64) -> [f64; 2]) -> Part {
     let at = |k: usize| {
-        let [s, t] = [
+        map(
             (k % (n + 1)) as f64 / n as f64,
             (k / (n + 1)) as f64 / m as f64,
-        ];
-        [
-            low[0] + (high[0] - low[0]) * s,
-            low[1] + (high[1] - low[1]) * t,
-        ]
+        )
     };
     let cell = |k: usize| {
         let a = k / n * (n + 1) + k % n;
@@ -446,6 +450,7 @@ output.vtu = false
         let whole = energy(law, "");
         for crack in [flat, slanted] {
             let closed = energy(law, crack);
+            println!("{law}, {crack}: {:.4} %", 100.0 * (closed / whole - 1.0));
             assert!(
                 (closed / whole - 1.0).abs() < limit,
                 "{law}: {closed} {whole}"
@@ -505,4 +510,71 @@ output = {{ vtu = false, probes.c = {{ at = [0.5, 0.25] }} }}
     let typed = scene(0.6).replace("slope.msh", &mesh.to_string_lossy());
     let typed = typed.replace("duration = 3,", "duration = 1.5, checkpoint-every = 500,");
     resumes_with_the_same_bytes(&typed);
+}
+
+/// A cylinder of radius R on a block of the same material in plane strain, half of the contact seven cells wide: pressure `p₀ √(1 − x²/a²)` with `a² = 4 P R/(π E*)` and `p₀ = 2 P/(π a)`, `E* = E/(2 (1 − ν²))`.
+#[test]
+fn a_cylinder_presses_on_a_block_as_hertz_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let (radius, size) = (10.0, 4.0);
+    let graded = |s: f64| size * (2.0 * s - 1.0).abs().powf(2.2).copysign(2.0 * s - 1.0);
+    let cylinder = mapped("cylinder", [48, 24], |s, t| {
+        let low = graded(s).powi(2) / (2.0 * radius);
+        [graded(s), low + (size - low) * t * t]
+    });
+    let base = mapped("block", [54, 24], |s, t| {
+        [graded(s), -size * (1.0 - t) * (1.0 - t)]
+    });
+    write(folder.path(), "hertz.msh", &bodies(2, &[cylinder, base]));
+    let scene = r#"
+kinematics = "plane-strain"
+coupling = "local"
+contact = {}
+mesh.file.path = "hertz.msh"
+materials.m.lps = { youngs-modulus = 1000, poisson-ratio = 0.3 }
+conditions.base.displacement = { on = "block-bottom", x = 0, y = 0 }
+conditions.down.displacement = { on = "cylinder-top", x = 0, y = -0.02 }
+[output]
+vtu = false
+stresses = ["von-mises"]
+lines.face = { from = [0, -0.0005], to = [0.5, -0.0005], samples = 201 }
+"#;
+    write(folder.path(), "hertz.toml", scene);
+    let said = run(folder.path(), &["hertz.toml", "--json"]);
+    let summary: serde_json::Value = serde_json::from_str(&said).unwrap();
+    let all = summary["reactions"].as_array().unwrap();
+    let found = all.iter().find(|r| r["condition"] == "base").unwrap();
+    let load = found["force"][1].as_f64().unwrap();
+    let modulus = 1000.0 / (2.0 * (1.0 - 0.09));
+    let half = (4.0 * load * radius / (PI * modulus)).sqrt();
+    let peak = 2.0 * load / (PI * half);
+    // p² is linear in x²; stresses are the means of cells, each at the middle of its samples
+    let face = folder.path().join("out/hertz_face.csv");
+    let (x, pressure) = (column(&face, "x"), column(&face, "syy"));
+    let mut cells: Vec<(f64, f64, f64)> = Vec::new();
+    for (x, p) in x.into_iter().zip(pressure) {
+        match cells.last_mut() {
+            Some(cell) if cell.1 == -p => cell.2 = x,
+            _ => cells.push((x, -p, x)),
+        }
+    }
+    let largest = cells.iter().fold(0.0_f64, |most, cell| most.max(cell.1));
+    cells.retain(|cell| cell.1 > 0.4 * largest);
+    assert!(cells.len() >= 6, "{cells:?}");
+    let points = cells
+        .iter()
+        .map(|c| ((0.5 * (c.0 + c.2)).powi(2), c.1 * c.1));
+    let count = cells.len() as f64;
+    let (sx, sy) = points
+        .clone()
+        .fold((0.0, 0.0), |(a, b), (x, y)| (a + x / count, b + y / count));
+    let (xx, xy) = points.fold((0.0, 0.0), |(a, b), (x, y)| {
+        (a + (x - sx) * (x - sx), b + (x - sx) * (y - sy))
+    });
+    let slope = xy / xx;
+    let fitted = sy - slope * sx;
+    let found = ((-fitted / slope).sqrt() / half, fitted.sqrt() / peak);
+    println!("half-width and pressure over those of Hertz: {found:?}");
+    assert!((found.0 - 1.0).abs() < 0.05, "{found:?}");
+    assert!((found.1 - 1.0).abs() < 0.03, "{found:?}");
 }
