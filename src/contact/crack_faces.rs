@@ -34,20 +34,28 @@ fn rule<const D: usize>() -> Vec<[f64; D]> {
 /// Pieces of a crack no longer than `length`; none of a shape that is no surface.
 pub(super) fn pieces<const D: usize>(shape: &Shape<D>, length: f64) -> Vec<[Vector<D>; D]> {
     let mut found = Vec::new();
-    match (D, shape) {
-        (1, Shape::Segment { a, .. }) => found.push([*a; D]),
-        (2, Shape::Segment { a, b }) => divide_segment(a, b, length, &mut found),
-        (2, Shape::Polyline(corners)) => {
+    match shape {
+        Shape::Segment { a, .. } if D == 1 => found.push([*a; D]),
+        Shape::Segment { a, b } if D == 2 => divide_segment(a, b, length, &mut found),
+        Shape::Polyline(corners) if D == 2 => {
             for pair in corners.windows(2) {
                 divide_segment(&pair[0], &pair[1], length, &mut found);
             }
         }
-        (3, Shape::Polygon(corners)) => {
+        Shape::Polygon(corners) if D == 3 => {
             for triangle in triangles(corners) {
                 divide_triangle(triangle, length, &mut found);
             }
         }
-        _ => {}
+        // no surfaces in this dimension, and what no scene takes for a crack
+        Shape::Segment { .. }
+        | Shape::Polyline(_)
+        | Shape::Polygon(_)
+        | Shape::Box { .. }
+        | Shape::Ball { .. }
+        | Shape::Everywhere
+        | Shape::Union(_)
+        | Shape::Without { .. } => {}
     }
     found
 }

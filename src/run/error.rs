@@ -171,13 +171,17 @@ pub enum RunError {
     },
     /// Surfaces lie in each other at time zero.
     #[error(
-        "contact: surfaces lie in each other at time zero, by {depth:.4e} at ({}): move the bodies apart, or type contact.adjust = {depth:.1e} or more, for surfaces that just touch there", place.iter().map(|x| format!("{x:.4e}")).collect::<Vec<_>>().join(", ")
+        "contact: surfaces lie in each other at time zero, by {depth:.4e} at ({}): move the bodies apart{}",
+        place.iter().map(|x| format!("{x:.4e}")).collect::<Vec<_>>().join(", "),
+        adjust.map_or(String::new(), |a| format!(", or type contact.adjust = {a:.1e}, for surfaces that just touch there"))
     )]
     SurfacesOverlap {
         /// Depth \[m\].
         depth: f64,
         /// Position of the greatest depth.
         place: Vec<f64>,
+        /// Distance of adjustment that would do \[m\]; none where it would be more than half a cell.
+        adjust: Option<f64>,
     },
     /// A condition meets no site.
     #[error("the condition `{condition}` meets no site of the model; {remedy}")]

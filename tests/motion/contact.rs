@@ -353,6 +353,16 @@ fn bars_of_elements_and_of_points_exchange_their_velocities() {
     }
 }
 
+/// An error without its frame.
+fn in_one_line(error: &[u8]) -> String {
+    let text = String::from_utf8_lossy(error);
+    let words: Vec<&str> = text
+        .split_whitespace()
+        .filter(|word| *word != "│")
+        .collect();
+    words.join(" ")
+}
+
 /// Two blocks whose meshes do not match are pressed together: a uniform stress, in load steps and at rest.
 #[test]
 fn blocks_that_touch_are_pressed_as_one() {
@@ -409,9 +419,25 @@ vtu = false
         .args(["run", "blocks.toml"])
         .output()
         .unwrap();
-    let said = String::from_utf8_lossy(&refused.stderr).replace('\n', " ");
+    let said = in_one_line(&refused.stderr);
     assert!(
         !refused.status.success() && said.contains("contact.adjust"),
+        "{said}"
+    );
+    // as it says
+    let (adjusted, _) = reaction("solve.quasi-static.steps = 1", "adjust = 1.2e-4");
+    assert!((adjusted / 20.0 - 1.0).abs() < 2e-3, "{adjusted}");
+    assert!(said.contains("contact.adjust = 1.2e-4"), "{said}");
+    // no adjustment that would be refused
+    write(folder.path(), "blocks.msh", &parts(-0.2));
+    write(folder.path(), "blocks.toml", &text);
+    let refused = bondline(folder.path())
+        .args(["run", "blocks.toml"])
+        .output()
+        .unwrap();
+    let said = in_one_line(&refused.stderr);
+    assert!(
+        said.contains("move the bodies apart") && !said.contains("contact.adjust"),
         "{said}"
     );
 }

@@ -16,11 +16,11 @@ use crate::tensor::Vector;
 /// Penalty of surfaces in motion over the stiffness of a cell, with the usual stiffness of points.
 const IN_MOTION: f64 = 0.25;
 
-/// Factor of contact in the bounds of a motion: two bars of 100 cells that collide then keep their energy to 1e-3, and with 4 no better.
-const COUNTED: f64 = 2.0;
-
 /// The same at rest, where no step has to be stable: a strain of the cells of 1 % leaves a depth of 1e-4 of them.
 const AT_REST: f64 = 100.0;
+
+/// Factor of contact in the bounds of a motion: two bars of 100 cells that collide then keep their energy to 1e-3, and with 4 no better.
+const COUNTED: f64 = 2.0;
 
 /// The usual stiffness of points, in that of a bond as long as the horizon.
 const USUAL: f64 = 15.0;
@@ -131,6 +131,8 @@ pub(crate) fn begin<const D: usize>(
         return Err(RunError::SurfacesOverlap {
             depth: deepest.depth,
             place: deepest.rest.as_slice().to_vec(),
+            // more than the depth, as it is printed
+            adjust: Some(1.2 * deepest.depth).filter(|a| 1.1 * a < 0.5 * contact.smallest()),
         });
     }
     ForceTerm::commit(contact, u, Interval::AT_ONCE);
