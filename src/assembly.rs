@@ -96,6 +96,14 @@ impl Transfer {
         }
     }
 
+    /// The site with the largest weight in a row: the place itself, where that is a site.
+    pub fn heaviest(&self, place: usize) -> Option<Centre> {
+        let heaviest = self
+            .row(place)
+            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        heaviest.map(|(site, _)| Centre::Site(site))
+    }
+
     /// The displacement of a place; `u` holds `D` numbers per site.
     pub fn displacement<const D: usize>(&self, place: usize, u: &[f64]) -> Vector<D> {
         let mut sum = Vector::zeros();
@@ -120,6 +128,28 @@ pub struct Row<const D: usize> {
     /// Stiffnesses of elements, each at its number's remainder: nodes that follow each other have elements in common.
     elements: Vec<(u32, Vec<Tensor<D>>)>,
     counted: Option<Counted>,
+    /// The parts of the row so far, and the centre of the one at hand; none of rows that are wanted as a whole.
+    parts: Option<(Vec<RowPart<D>>, Option<Centre>)>,
+}
+
+/// The place about which the body of a part of a row expands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Centre {
+    /// A site.
+    Site(u32),
+    /// The centroid of a cell.
+    Cell(u32),
+}
+
+/// A part of a row: of the gradient of one energy (of a bond, a family, an element), which a translation leaves as it is.
+#[derive(Clone, Debug)]
+pub struct RowPart<const D: usize> {
+    /// The middle of what has that energy; none of a row without one.
+    pub centre: Option<Centre>,
+    /// Sites, each once.
+    pub columns: Vec<u32>,
+    /// A block \[N/m\] for each.
+    pub blocks: Vec<Tensor<D>>,
 }
 
 /// The material whose elements and bonds alone count in a row; of a bond between two materials each has half.
@@ -148,12 +178,58 @@ impl<const D: usize> Row<D> {
             place_blocks: Vec::new(),
             elements: Vec::new(),
             counted: None,
+            parts: None,
         }
     }
 
-    /// Counts the elements and bonds of one material alone from now on.
-    pub fn count_only(&mut self, counted: Counted) {
-        self.counted = Some(counted);
+    /// An empty row whose parts stay apart, for [`Row::take_parts`].
+    pub fn in_parts(sites: usize) -> Self {
+        Self {
+            parts: Some((Vec::new(), None)),
+            ..Self::new(sites)
+        }
+    }
+
+    /// Adds a part of the row, what `add` adds, of which `centre` is the middle.
+    #[inline]
+    pub fn part(&mut self, centre: impl FnOnce() -> Option<Centre>, add: impl FnOnce(&mut Self)) {
+        if self.parts.is_none() {
+            return add(self);
+        }
+        let around = self.begin_part(centre());
+        add(self);
+        self.begin_part(around);
+    }
+
+    /// Returns the centre of the part that this ends.
+    fn begin_part(&mut self, next: Option<Centre>) -> Option<Centre> {
+        let (mut parts, centre) = self.parts.take()?;
+        if !self.columns.is_empty() {
+            let mut part = RowPart {
+                centre,
+                columns: Vec::with_capacity(self.columns.len()),
+                blocks: Vec::with_capacity(self.columns.len()),
+            };
+            self.take_blocks(|column, block| {
+                part.columns.push(column);
+                part.blocks.push(*block);
+            });
+            parts.push(part);
+        }
+        self.parts = Some((parts, next));
+        centre
+    }
+
+    /// The parts of the row, in the order in which they came, which empties it; none of a row that was made as a whole.
+    pub fn take_parts(&mut self) -> Vec<RowPart<D>> {
+        self.begin_part(None);
+        let parts = self.parts.as_mut().map(|(parts, _)| std::mem::take(parts));
+        parts.unwrap_or_default()
+    }
+
+    /// Counts the elements and bonds of one material alone from now on; with none all.
+    pub fn count_only(&mut self, counted: Option<Counted>) {
+        self.counted = counted;
     }
 
     /// Part of an element of a material that counts.
@@ -240,6 +316,10 @@ impl<const D: usize> Row<D> {
             self.add_site(site, block);
             return;
         }
+        if self.parts.is_some() {
+            self.add(transfer, place, block);
+            return;
+        }
         if self.slot_of_place.len() <= place {
             self.slot_of_place.resize(transfer.len(), EMPTY);
         }
@@ -270,6 +350,9 @@ impl<const D: usize> Row<D> {
     pub fn scale(&mut self, factor: f64) {
         if factor != 1.0 {
             self.blocks.iter_mut().for_each(|block| *block *= factor);
+            let parts = self.parts.iter_mut().flat_map(|(parts, _)| parts);
+            let blocks = parts.flat_map(|part| &mut part.blocks);
+            blocks.for_each(|block| *block *= factor);
         }
     }
 

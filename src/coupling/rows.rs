@@ -1,7 +1,7 @@
 //! Rows of a model: those of its elements, and all of them assembled.
 
 use crate::{
-    assembly::{self, Row},
+    assembly::{self, Centre, Row},
     coupling::Operator,
     fem,
     model::{CellRole, Model},
@@ -62,7 +62,10 @@ impl<const D: usize> Model<D> {
             true => row.add(&self.node_transfer, n as usize, block),
             false => row.add(&self.node_transfer, n as usize, &(block * weight)),
         };
-        row.element_row((c, self.mesh.cell(c)), local, stiffness, add);
+        row.part(
+            || Some(Centre::Cell(c as u32)),
+            |row| row.element_row((c, self.mesh.cell(c)), local, stiffness, add),
+        );
     }
 
     /// Adds the row that a site has in the stiffness: that of the operator times its [`Model::row_scale`].

@@ -265,13 +265,6 @@ impl<const D: usize> Tangent for CoupledSystem<'_, D> {
         self.rows_at(sites)
     }
 
-    fn rows_that_expand(&self, sites: &[u32]) -> BlockCsr {
-        match self.has_heated_bonds() {
-            true => self.rows_beside_heated_bonds(sites),
-            false => self.rows_at(sites),
-        }
-    }
-
     fn seam_sites(&self) -> Vec<u32> {
         let sites = 0..self.mass.len() as u32;
         sites

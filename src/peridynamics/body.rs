@@ -283,6 +283,19 @@ impl<const D: usize> PdBody<D> {
         counts: impl Fn(usize) -> bool,
         row: &mut Row<D>,
     ) {
+        row.part(
+            || self.cloud.transfer.heaviest(i),
+            |row| self.add_bonds_of_row(i, weights, counts, row),
+        );
+    }
+
+    fn add_bonds_of_row(
+        &self,
+        i: usize,
+        weights: impl Fn(usize) -> [f64; 2],
+        counts: impl Fn(usize) -> bool,
+        row: &mut Row<D>,
+    ) {
         let lies_elsewhere = self.elsewhere.get(i).is_some_and(|is| *is);
         assert!(
             !lies_elsewhere,
@@ -364,36 +377,42 @@ impl<const D: usize> PdBody<D> {
 
     /// Gathers the row of `A : Ḡ_j`, where `a[b]` is the block that multiplies column `b` of `Ḡ_j = Σ ω η ⊗ ξ V`.
     fn add_weighted_gradient(&self, j: usize, a: &[Tensor<D>; D], row: &mut Row<D>) {
-        let (_, omega) = self.kernel(j);
-        let mut own = Tensor::zeros();
-        for (k, &l) in self.families.of(j).iter().enumerate() {
-            let l = l as usize;
-            let volume = self.cloud.volume[l] * self.part_of_bond(j, l, row);
-            let xi = self.bond(j, l) * (omega[k] * volume);
-            let mut block = Tensor::zeros();
-            for b in 0..D {
-                block += a[b] * xi[b];
+        let add = |row: &mut Row<D>| {
+            let (_, omega) = self.kernel(j);
+            let mut own = Tensor::zeros();
+            for (k, &l) in self.families.of(j).iter().enumerate() {
+                let l = l as usize;
+                let volume = self.cloud.volume[l] * self.part_of_bond(j, l, row);
+                let xi = self.bond(j, l) * (omega[k] * volume);
+                let mut block = Tensor::zeros();
+                for b in 0..D {
+                    block += a[b] * xi[b];
+                }
+                own -= block;
+                row.gather(&self.cloud.transfer, l, &block);
             }
-            own -= block;
-            row.gather(&self.cloud.transfer, l, &block);
-        }
-        row.gather(&self.cloud.transfer, j, &own);
+            row.gather(&self.cloud.transfer, j, &own);
+        };
+        row.part(|| self.cloud.transfer.heaviest(j), add);
     }
 
     /// Gathers the row of `a Σ p |ξ|² ξ·η V + b tr Ḡ_j`, [`StatePart::deviator`].
     fn add_deviators(&self, j: usize, a: &Vector<D>, b: &Vector<D>, row: &mut Row<D>) {
-        let (pair, omega) = self.kernel(j);
-        let mut own = Tensor::zeros();
-        for (k, &l) in self.families.of(j).iter().enumerate() {
-            let l = l as usize;
-            let xi = self.bond(j, l);
-            let v = self.cloud.volume[l] * self.part_of_bond(j, l, row);
-            let weighted = a * (pair[k] * xi.norm_squared() * v) + b * (omega[k] * v);
-            let block = weighted * xi.transpose();
-            own -= block;
-            row.gather(&self.cloud.transfer, l, &block);
-        }
-        row.gather(&self.cloud.transfer, j, &own);
+        let add = |row: &mut Row<D>| {
+            let (pair, omega) = self.kernel(j);
+            let mut own = Tensor::zeros();
+            for (k, &l) in self.families.of(j).iter().enumerate() {
+                let l = l as usize;
+                let xi = self.bond(j, l);
+                let v = self.cloud.volume[l] * self.part_of_bond(j, l, row);
+                let weighted = a * (pair[k] * xi.norm_squared() * v) + b * (omega[k] * v);
+                let block = weighted * xi.transpose();
+                own -= block;
+                row.gather(&self.cloud.transfer, l, &block);
+            }
+            row.gather(&self.cloud.transfer, j, &own);
+        };
+        row.part(|| self.cloud.transfer.heaviest(j), add);
     }
 
     /// The coefficients that the far end of bond `k` of point `i` gives it.
@@ -441,7 +460,10 @@ impl<const D: usize> PdBody<D> {
         row: &mut Row<D>,
     ) {
         for (j, a) in on {
-            self.add_partial_stress(j, &a, row);
+            row.part(
+                || self.cloud.transfer.heaviest(j),
+                |row| self.add_partial_stress(j, &a, row),
+            );
         }
         row.spread(&self.cloud.transfer);
     }

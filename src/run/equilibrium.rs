@@ -1,7 +1,5 @@
 //! Static equilibrium of a model under its conditions: assembly, loads, supports, solution.
 
-use std::borrow::Cow;
-
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -105,13 +103,7 @@ pub(crate) fn equilibrium<const D: usize>(
     let mut stiffness = model.assemble(at.operator, progress);
     watch.lap(&mut timings, "assembly");
     let (mut load, applied) = loads(model, at.conditions, at.time)?;
-    let of_system = || {
-        system
-            .as_ref()
-            .map(|s| s.rows_that_expand(&all_sites(model)))
-    };
-    let rows = || of_system().map_or(Cow::Borrowed(&stiffness), Cow::Owned);
-    let expands = expansion(at, None, system.is_some(), rows)?;
+    let expands = expansion(at, None, system.is_some())?;
     expand(&mut load, expands.as_deref());
     let (prescribed, holder) = supports(model, at.conditions, at.time)?;
     let positions: Vec<[f64; 3]> = model.sites.iter().map(|s| padded(&s.position)).collect();
@@ -179,33 +171,27 @@ fn given_up(solver: &Solver, info: &StaticInfo) -> Option<Decision> {
     })
 }
 
-/// The numbers of all sites.
-fn all_sites<const D: usize>(model: &Model<D>) -> Vec<u32> {
-    (0..model.sites.len() as u32).collect()
-}
-
 /// The forces of free expansion on all sites, or on those of `own`; none where nothing expands.
-fn expansion<'r, const D: usize>(
+fn expansion<const D: usize>(
     at: &StaticInput<'_, D>,
     own: Option<&[u32]>,
     knows_temperature: bool,
-    rows: impl FnOnce() -> Cow<'r, BlockCsr>,
 ) -> Result<Option<Vec<f64>>, RunError> {
     let Some(thermal) = at.thermal else {
         return Ok(None);
     };
-    let rows = thermal.rows(at.model, at.operator, own, knows_temperature, rows)?;
-    Ok(Some(thermal.forces(at.model, &rows, own, at.time)))
+    let rows = (at.operator, own);
+    let forces = thermal.forces_at(at.model, rows, knows_temperature, at.time)?;
+    Ok(Some(forces))
 }
 
 /// Collective: the forces of free expansion on all sites, each process from the rows of its own; none where nothing expands.
 fn spread_expansion<const D: usize>(
     at: &StaticInput<'_, D>,
-    own_rows: &BlockCsr,
     spread: Spread<'_>,
 ) -> Result<Option<Vec<f64>>, RunError> {
     let own = Some(spread.own());
-    let Some(forces) = expansion(at, own, false, || Cow::Borrowed(own_rows))? else {
+    let Some(forces) = expansion(at, own, false)? else {
         return Ok(None);
     };
     let own = spread.own().iter().map(|&site| site as usize * D);
@@ -256,7 +242,7 @@ fn spread<const D: usize>(
     let stiffness = model.assemble_sites(at.operator, spread.own(), progress);
     watch.lap(&mut timings, "assembly");
     let (mut load, applied) = loads(model, at.conditions, at.time)?;
-    let expands = spread_expansion(at, &stiffness, spread)?;
+    let expands = spread_expansion(at, spread)?;
     expand(&mut load, expands.as_deref());
     let (prescribed, holder) = supports(model, at.conditions, at.time)?;
     let rows = SpreadRows {

@@ -395,9 +395,9 @@ impl<'a, const D: usize> StaticBody<'a, D> {
             force: balance.force.as_slice(),
             relative: balance.relative(),
             difference: None,
-            expands: self.rest.stresses.thermal.is_some(),
         };
-        let asks = known.is_told() && !known.expands && self.ranks.is_none();
+        let expands = self.rest.stresses.thermal.is_some();
+        let asks = known.is_told() && !expands && self.ranks.is_none();
         let difference = || difference_from_elements(self.model, self.rest, u);
         Imbalance {
             difference: asks.then(difference).flatten(),

@@ -3,18 +3,20 @@
 //! A body whose temperature is linear in space expands without stress by a displacement that is quadratic: with the rise τ and its gradient g at a place, `u = α (τ r + (g·r) r − ½ g |r|²)`, r from there. Its strain is `α (τ + g·r)` in
 //! all directions. Source: [BoleyWeiner1960], the strain being compatible where the temperature is linear.
 //!
-//! The thermal force of a site is what its own row makes of that displacement, with the rise of both ends of every pair: `α ξ (τ_i + τ_j)/2` along a bond, so that the extension of a bond less its thermal part is what
-//! stretches it. A finite element takes its own expansion, at its nodes. Every row, of a seam too, is then free of force where the body expands freely under a uniform or a linear temperature.
+//! The thermal force is the gradient of the energy that is left of the stored one by a displacement under which each part of it (a bond, a family, a piece of a bond at a seam, an element) expands freely about its own
+//! middle, with the rise of both ends of every pair: `α ξ (τ_i + τ_j)/2`, so that the extension of a bond less its thermal part is what stretches it. A part takes no force from a translation, so its forces add up to zero at any
+//! temperature. Under a uniform or a linear one the parts expand by the same field but for rigid motions, and every row, of a seam too, is free of force where the body expands freely.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
-use crate::assembly::{self, Counted, Row};
+use rustc_hash::FxHashMap;
+
+use crate::assembly::{Centre, Counted, Row, RowPart};
 use crate::coupling::semidiscrete::FreeStretch;
 use crate::fem;
+use crate::parallel;
 use crate::run::error::RunError;
 use crate::scene::temperature::Temperature;
-use crate::system::BlockCsr;
 use crate::tensor::{Tensor, Vector, padded};
 use crate::{
     coupling::Operator,
@@ -34,8 +36,21 @@ pub struct Thermal<const D: usize> {
     pub reach: f64,
 }
 
-/// Rows that expand, with the expansion per degree of what is in them.
-pub struct ExpandingRows<'r>(Vec<(f64, Cow<'r, BlockCsr>)>);
+/// Forces of free expansion as products with the temperature, of the sites whose rows are not those of elements alone.
+///
+/// Shapes: a row for each of `sites`; `columns` are sites, and from their number on the entries of `cells`; `value` and `slope` have one entry per column. Units: `value` \[N/K\], `slope` \[N m/K\].
+#[derive(Clone, Debug, Default)]
+pub struct ExpandingRows<const D: usize> {
+    sites: Vec<u32>,
+    offsets: Vec<usize>,
+    columns: Vec<u32>,
+    value: Vec<Vector<D>>,
+    slope: Vec<Tensor<D>>,
+    cells: Vec<u32>,
+}
+
+/// Force of free expansion by the rise of the temperature at a place, and by its gradient there.
+type ByRise<const D: usize> = (Vector<D>, Tensor<D>);
 
 /// Rise of the temperature at a place, and its gradient.
 #[derive(Clone, Copy, Debug)]
@@ -132,89 +147,154 @@ impl<const D: usize> Thermal<D> {
         parts.map(|part| alpha * part).collect()
     }
 
-    /// Force \[N\] by dof that free expansion would take: `F = K u − f`; `rows` are those of all sites, or of the sites `own`, of which alone the forces are then right.
-    pub fn forces(
-        &self,
-        model: &Model<D>,
-        rows: &ExpandingRows<'_>,
-        own: Option<&[u32]>,
-        t: f64,
-    ) -> Vec<f64> {
+    /// Force \[N\] by dof that free expansion would take: `F = K u − f`; `rows` are those of all sites, or of some, of which alone the forces are then right.
+    pub fn forces(&self, model: &Model<D>, rows: &ExpandingRows<D>, t: f64) -> Vec<f64> {
         let mut forces = vec![0.0; model.sites.len() * D];
-        let inner = inner_sites(model);
-        if inner.contains(&false) {
-            let rise: Vec<Rise<D>> = (model.sites.iter())
-                .map(|s| self.rise(&s.position, t))
+        if !rows.sites.is_empty() {
+            let of_sites = model.sites.iter().map(|s| s.position);
+            let of_cells = rows.cells.iter().map(|&c| model.mesh.centroid(c as usize));
+            let rise: Vec<Rise<D>> = (of_sites.chain(of_cells))
+                .map(|x| self.rise(&x, t))
                 .collect();
-            let site_of = |row: usize| own.map_or(row, |own| own[row] as usize);
-            for (alpha, rows) in &rows.0 {
-                for row in (0..rows.rows()).filter(|&row| !inner[site_of(row)]) {
-                    let site = site_of(row);
-                    let x = &model.sites[site].position;
-                    let (columns, blocks) = rows.row(row);
-                    let mut sum = Vector::<D>::zeros();
-                    for (&column, block) in columns.iter().zip(blocks.chunks_exact(D * D)) {
-                        let other = column as usize;
-                        let xi = model.sites[other].position - x;
-                        sum +=
-                            Tensor::from_row_slice(block) * parted(&rise[site], &rise[other], &xi);
-                    }
-                    for k in 0..D {
-                        forces[site * D + k] += alpha * sum[k];
-                    }
+            for (row, &site) in rows.sites.iter().enumerate() {
+                let mut sum = Vector::<D>::zeros();
+                for k in rows.offsets[row]..rows.offsets[row + 1] {
+                    let rise = &rise[rows.columns[k] as usize];
+                    sum += rows.value[k] * rise.value + rows.slope[k] * rise.slope;
                 }
+                let force = &mut forces[site as usize * D..][..D];
+                force.copy_from_slice(sum.as_slice());
             }
         }
-        self.add_elements(model, &inner, t, &mut forces);
+        self.add_elements(model, &inner_sites(model), t, &mut forces);
         forces
     }
 
-    /// The rows by which the sites `own`, or all, expand. Where the materials in them expand alike, `alike` gives their rows; else they are assembled anew, those of each material for itself.
-    ///
-    /// With `knows_temperature` the bonds of rows that are those of the body alone do without.
+    /// Those of one temperature, without rows; of the sites `own`, or all. With `knows_temperature` the bonds of the body do without.
     ///
     /// # Errors
-    /// [`RunError::Later`] for a coupling whose rows are not those of materials.
-    pub fn rows<'r>(
+    /// [`RunError::Later`] for materials that expand differently in a coupling whose rows are not those of materials.
+    pub fn forces_at(
         &self,
         model: &Model<D>,
-        operator: &Operator<'_, D>,
-        own: Option<&[u32]>,
+        rows: (&Operator<'_, D>, Option<&[u32]>),
         knows_temperature: bool,
-        alike: impl FnOnce() -> Cow<'r, BlockCsr>,
-    ) -> Result<ExpandingRows<'r>, RunError> {
+        t: f64,
+    ) -> Result<Vec<f64>, RunError> {
+        let mut forces = vec![0.0; model.sites.len() * D];
+        let rise_at = |x: &Vector<D>| self.rise(x, t);
+        let rise: Vec<Rise<D>> = match inner_sites(model).contains(&false) {
+            true => (model.sites.iter().map(|s| rise_at(&s.position))).collect(),
+            false => Vec::new(),
+        };
+        let add = |sum: &mut Vector<D>, part: &RowPart<D>, alpha: f64| {
+            let (here, x) = match part.centre {
+                Some(Centre::Site(s)) => (rise[s as usize], model.sites[s as usize].position),
+                Some(Centre::Cell(cell)) => {
+                    let x = model.mesh.centroid(cell as usize);
+                    (rise_at(&x), x)
+                }
+                None => return,
+            };
+            for (&column, block) in part.columns.iter().zip(&part.blocks) {
+                let column = column as usize;
+                let xi = model.sites[column].position - x;
+                *sum += block * parted(&here, &rise[column], &xi) * alpha;
+            }
+        };
+        let (sites, sums) =
+            self.each_part(model, rows, knows_temperature, (Vector::zeros(), add))?;
+        for (&site, sum) in sites.iter().zip(&sums) {
+            forces[site as usize * D..][..D].copy_from_slice(sum.as_slice());
+        }
+        self.add_elements(model, &inner_sites(model), t, &mut forces);
+        Ok(forces)
+    }
+
+    /// The rows by which the sites `own`, or all, expand at temperatures that vary in time. With `knows_temperature` the bonds of the body do without.
+    ///
+    /// # Errors
+    /// [`RunError::Later`] for materials that expand differently in a coupling whose rows are not those of materials.
+    pub fn rows(
+        &self,
+        model: &Model<D>,
+        rows: (&Operator<'_, D>, Option<&[u32]>),
+        knows_temperature: bool,
+    ) -> Result<ExpandingRows<D>, RunError> {
+        let add = |found: &mut FxHashMap<u32, ByRise<D>>, part: &RowPart<D>, alpha: f64| {
+            add_part(model, part, alpha, found);
+        };
+        let (sites, found) =
+            self.each_part(model, rows, knows_temperature, (FxHashMap::default(), add))?;
+        let each = found.into_iter().map(|found| {
+            let mut entries: Vec<_> = found.into_iter().collect();
+            entries.sort_unstable_by_key(|entry| entry.0);
+            entries
+        });
+        let each = each.collect();
+        Ok(ExpandingRows::new(sites, each, model.sites.len() as u32))
+    }
+
+    /// Gives `add` each part of the rows of the sites `own`, or all, that are not those of elements alone, with the expansion of the material that it counts; returns these sites and what `add` made of `start` at each.
+    fn each_part<T: Clone + Send + Sync>(
+        &self,
+        model: &Model<D>,
+        (operator, own): (&Operator<'_, D>, Option<&[u32]>),
+        knows_temperature: bool,
+        (start, add): (T, impl Fn(&mut T, &RowPart<D>, f64) + Sync),
+    ) -> Result<(Vec<u32>, Vec<T>), RunError> {
         let materials = self.materials_in_rows(model);
         let alpha = |m: u16| self.expansion[usize::from(m)];
         let first = materials.first().copied();
         let first = first.unwrap_or_else(|| model.peridynamic_material());
-        if materials.iter().all(|&m| alpha(m) == alpha(first)) {
-            return Ok(ExpandingRows(vec![(alpha(first), alike())]));
-        }
-        if !operator.counts_materials {
-            return Err(RunError::Later {
-                what: "materials that expand differently at the seam of this coupling, or among its points (in plane strain (1 + ν) α counts)",
-                remedy: "use coupling = \"splice\" or \"nonlocal\", or enclose the zone in elements of the material of its points",
-            });
-        }
-        let all: Vec<u32> = (0..model.sites.len() as u32).collect();
-        let sites = own.unwrap_or(&all);
         let of_points = model.peridynamic_material();
-        let of_material = |material: u16| {
-            let rows = assembly::assemble_apart(sites.len(), all.len(), |r, row: &mut Row<D>| {
-                let site = sites[r] as usize;
-                row.count_only(Counted {
-                    material,
-                    of_points,
+        // materials that expand alike need not be told apart
+        let counted: Vec<(Option<Counted>, f64)> = match materials
+            .iter()
+            .all(|&m| alpha(m) == alpha(first))
+        {
+            true => vec![(None, alpha(first))],
+            false if operator.counts_materials => (materials.iter())
+                .map(|&material| {
+                    let counted = Counted {
+                        material,
+                        of_points,
+                    };
+                    (Some(counted), alpha(material))
+                })
+                .collect(),
+            false => {
+                return Err(RunError::Later {
+                    what: "materials that expand differently at the seam of this coupling, or among its points (in plane strain (1 + ν) α counts)",
+                    remedy: "use coupling = \"splice\" or \"nonlocal\", or enclose the zone in elements of the material of its points",
                 });
-                if !(knows_temperature && operator.is_body_row(site)) {
-                    model.add_scaled_row(operator, site, row);
-                }
-            });
-            (alpha(material), Cow::Owned(rows))
+            }
         };
-        Ok(ExpandingRows(
-            materials.into_iter().map(of_material).collect(),
-        ))
+        let all: Vec<u32> = (0..model.sites.len() as u32).collect();
+        let inner = inner_sites(model);
+        let sites = own.unwrap_or(&all).iter().copied();
+        let sites: Vec<u32> = sites.filter(|&site| !inner[site as usize]).collect();
+        let new_row = || Row::in_parts(all.len());
+        let each = parallel::map_with(sites.len(), 16, new_row, |row, r| {
+            let mut found = start.clone();
+            let site = sites[r] as usize;
+            for &(counted, alpha) in &counted {
+                row.count_only(counted);
+                row.part(
+                    || Some(Centre::Site(sites[r])),
+                    |row| match knows_temperature {
+                        true => operator.add_row_beside_bonds(site, false, row),
+                        false => operator.add_row(site, row),
+                    },
+                );
+                row.scale(model.row_scale().map_or(1.0, |scale| scale[site]));
+                for part in row.take_parts() {
+                    add(&mut found, &part, alpha);
+                }
+            }
+            found
+        });
+        Ok((sites, each))
     }
 
     /// The materials of points and of the elements in rows that are not those of elements alone, ascending.
@@ -256,6 +336,68 @@ impl<const D: usize> Thermal<D> {
                     }
                 }
             });
+        }
+    }
+}
+
+impl<const D: usize> ExpandingRows<D> {
+    /// By the entries of each row, ascending by column; a cell has the number `of_sites` and its own.
+    fn new(sites: Vec<u32>, each: Vec<Vec<(u32, ByRise<D>)>>, of_sites: u32) -> Self {
+        let columns = each.iter().flatten().map(|entry| entry.0);
+        let mut cells: Vec<u32> = columns.filter_map(|c| c.checked_sub(of_sites)).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        let mut rows = Self {
+            sites,
+            offsets: vec![0],
+            cells,
+            ..Self::default()
+        };
+        for (column, (value, slope)) in each.iter().flatten() {
+            let cell = column.checked_sub(of_sites);
+            let place = cell.and_then(|cell| rows.cells.binary_search(&cell).ok());
+            let column = place.map_or(*column, |place| of_sites + place as u32);
+            rows.columns.push(column);
+            rows.value.push(*value);
+            rows.slope.push(*slope);
+        }
+        for entries in &each {
+            let end = rows.offsets.last().copied().unwrap_or(0) + entries.len();
+            rows.offsets.push(end);
+        }
+        rows
+    }
+}
+
+/// Adds what a part of a row that expands by `alpha` per degree makes of the temperature, by site and by cell, a cell having the number of sites and its own: its block of each site times [`parted`] from its centre.
+fn add_part<const D: usize>(
+    model: &Model<D>,
+    part: &RowPart<D>,
+    alpha: f64,
+    found: &mut FxHashMap<u32, ByRise<D>>,
+) {
+    let (centre, x) = match part.centre {
+        Some(Centre::Site(site)) => (site, model.sites[site as usize].position),
+        Some(Centre::Cell(cell)) => {
+            let number = model.sites.len() as u32 + cell;
+            (number, model.mesh.centroid(cell as usize))
+        }
+        None => return,
+    };
+    for (&column, block) in part.columns.iter().zip(&part.blocks) {
+        let xi = model.sites[column as usize].position - x;
+        if column == centre {
+            continue;
+        }
+        let value = block * xi * (0.5 * alpha);
+        let shape = xi * xi.transpose() - Tensor::identity() * xi.norm_squared();
+        let slope = block * shape * (0.25 * alpha);
+        for place in [centre, column] {
+            let (of_value, of_slope) = found
+                .entry(place)
+                .or_insert((Vector::zeros(), Tensor::zeros()));
+            *of_value += value;
+            *of_slope += slope;
         }
     }
 }

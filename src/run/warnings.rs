@@ -83,8 +83,6 @@ pub(crate) struct Imbalance<'a> {
     pub relative: f64,
     /// Difference of displacements from those of elements alone, over the largest of these; none where that was not computed.
     pub difference: Option<f64>,
-    /// True if the body expands under a temperature.
-    pub expands: bool,
 }
 
 impl Imbalance<'_> {
@@ -98,12 +96,9 @@ impl Imbalance<'_> {
 pub(crate) fn out_of_balance(of: &Imbalance<'_>, traits: CouplingTraits) -> Option<String> {
     let force: Vec<String> = of.force.iter().map(|f| number(*f)).collect();
     // rows of a seam that cuts bonds balance whatever their displacements are
-    let remedy = match (traits.name, of.expands) {
-        (_, true) => {
-            "the rows of its seam are exact where the temperature is linear over an element, so lay the seam where it bends less, or couple by nonlocal"
-        }
-        ("truncated", false) => {
-            "the rows of its seam balance without a temperature: enclose the zone in more elements, or couple by nonlocal"
+    let remedy = match traits.name {
+        "truncated" => {
+            "the rows of its seam balance: enclose the zone in more elements, or couple by nonlocal"
         }
         _ => {
             "its seam balances affine fields only: couple by truncated, or enclose the zone in more elements, further from surfaces and supports"

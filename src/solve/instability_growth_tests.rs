@@ -254,10 +254,6 @@ impl Tangent for Fed {
         self.system.tangent_rows(sites)
     }
 
-    fn rows_that_expand(&self, sites: &[u32]) -> BlockCsr {
-        self.tangent_rows(sites)
-    }
-
     fn seam_sites(&self) -> Vec<u32> {
         self.sites.clone()
     }

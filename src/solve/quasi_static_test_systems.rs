@@ -119,10 +119,6 @@ impl Tangent for Bundle {
         BlockCsr::default()
     }
 
-    fn rows_that_expand(&self, sites: &[u32]) -> BlockCsr {
-        self.tangent_rows(sites)
-    }
-
     fn seam_sites(&self) -> Vec<u32> {
         (0..self.mass().len() as u32).collect()
     }
@@ -262,10 +258,6 @@ impl Tangent for Hardening {
 
     fn tangent_rows(&self, _sites: &[u32]) -> BlockCsr {
         BlockCsr::default()
-    }
-
-    fn rows_that_expand(&self, sites: &[u32]) -> BlockCsr {
-        self.tangent_rows(sites)
     }
 
     fn seam_sites(&self) -> Vec<u32> {

@@ -447,10 +447,6 @@ impl Tangent for SubCycled<'_> {
         BlockCsr::default()
     }
 
-    fn rows_that_expand(&self, sites: &[u32]) -> BlockCsr {
-        self.system.rows_that_expand(sites)
-    }
-
     fn seam_sites(&self) -> Vec<u32> {
         self.system.seam_sites()
     }

@@ -108,10 +108,6 @@ impl Tangent for LinearMotion {
         rows
     }
 
-    fn rows_that_expand(&self, sites: &[u32]) -> BlockCsr {
-        self.tangent_rows(sites)
-    }
-
     fn seam_sites(&self) -> Vec<u32> {
         (0..self.mass.len() as u32).collect()
     }

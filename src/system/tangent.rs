@@ -22,9 +22,6 @@ pub trait Tangent {
     /// Rows of the tangent at rest, in the order of `sites`: those of [`Tangent::tangent_is_constant`] sites and of sites that these are columns of. Without any row if the system does not know.
     fn tangent_rows(&self, sites: &[u32]) -> BlockCsr;
 
-    /// Rows of the tangent at rest, in the order of `sites`, less what does not expand or knows its temperature itself: by these a free expansion loads the sites.
-    fn rows_that_expand(&self, sites: &[u32]) -> BlockCsr;
-
     /// The sites at which rows of the tangent may differ from their columns; all of them if the system does not know.
     fn seam_sites(&self) -> Vec<u32>;
 

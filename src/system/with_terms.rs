@@ -207,10 +207,6 @@ where
         })
     }
 
-    fn rows_that_expand(&self, sites: &[u32]) -> BlockCsr {
-        self.body.rows_that_expand(sites)
-    }
-
     fn seam_sites(&self) -> Vec<u32> {
         self.body.seam_sites()
     }

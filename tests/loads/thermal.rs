@@ -96,6 +96,69 @@ fn a_linear_temperature_leaves_no_stress_either() {
     }
 }
 
+/// A plate that is cold at its lower side, with a zone there whose lattice no cell of the mesh follows; symmetric at its left and its top.
+const QUENCHED: &str = r#"
+kinematics = "plane-stress"
+mesh.rectangle = { min = [0, 0], max = [8, 3], x = { cells = 43 }, y = { cells = 17 } }
+materials.glass.MATERIAL
+temperature = { value = "300 - 280 * exp(-2 * y)", reference = 300 }
+zones.nonlocal.box = { min = [3, -1], max = [9, 2] }
+peridynamics.horizon = 0.4
+conditions.left.symmetry.on = "left"
+conditions.top.symmetry.on = "top"
+output.probes.p = { at = [6, 0.5] }
+output.vtu = false
+"#;
+
+/// A body that nothing loads exerts no force on what holds it, at a temperature that no element follows.
+#[test]
+fn expansion_is_in_balance_at_any_temperature() {
+    for material in [LPS, PAIRS] {
+        let text = QUENCHED.replace("MATERIAL", material);
+        let exact = run(
+            &text,
+            &[
+                "coupling=local",
+                "mesh.rectangle.x.cells=160",
+                "mesh.rectangle.y.cells=60",
+            ],
+        );
+        let exact = exact.column("scene_probes.csv", "ux")[0];
+        for set in [
+            &["coupling=truncated", "zones.skin=free-surfaces"][..],
+            &["coupling=truncated", "zones.skin=none"],
+            &["coupling=nonlocal"],
+        ] {
+            let done = run(&text, set);
+            // 0.07 where rows expanded about their own sites
+            let off = done.summary.out_of_balance_force.iter();
+            let off = off.fold(0.0f64, |most, f| most.max(f.abs()));
+            // E α ΔT over a side of the zone
+            assert!(
+                off < 1e-9 * 200.0 * 1e-5 * 280.0,
+                "{set:?} {material}: {off}"
+            );
+            let u = done.column("scene_probes.csv", "ux")[0];
+            println!("{set:?} {material}: {}", u / exact);
+            // without a skin the surfaces of points are others than those of the body
+            if set.contains(&"zones.skin=free-surfaces") {
+                assert!((u / exact - 1.0).abs() < 0.02, "{set:?}: {u} {exact}");
+            }
+            // load steps have other zones
+            if set != ["coupling=nonlocal"] {
+                continue;
+            }
+            let steps = [
+                "temperature.value=300 - 280 * exp(-2 * y) * t",
+                "solve.quasi-static.steps=1",
+            ];
+            let slowly = run(&text, &[set, &steps].concat());
+            let last = slowly.column("scene_history.csv", "p_ux");
+            assert!((last[last.len() - 1] / u - 1.0).abs() < 1e-6, "{set:?}");
+        }
+    }
+}
+
 /// A bar between two walls takes `−E α ΔT`, with finite elements, with points and with both.
 #[test]
 fn a_constrained_bar_is_pressed() {

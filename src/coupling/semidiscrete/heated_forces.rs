@@ -1,10 +1,7 @@
 //! Forces of a coupled system whose bonds expand with the temperature.
 
 use super::CoupledSystem;
-use crate::{
-    assembly::{self, Row},
-    system::{BlockCsr, FailureUpdate, Interval, SemiDiscrete},
-};
+use crate::system::{FailureUpdate, Interval, SemiDiscrete};
 
 /// Part of a change of temperature over which forces are differenced.
 const PART: f64 = 1e-3;
@@ -52,16 +49,5 @@ impl<const D: usize> CoupledSystem<'_, D> {
             *force += (further - *force) / PART;
         }
         true
-    }
-
-    /// Rows of sites without the traversed bonds.
-    pub(super) fn rows_beside_heated_bonds(&self, sites: &[u32]) -> BlockCsr {
-        assembly::assemble_apart(sites.len(), self.mass.len(), |r, row: &mut Row<D>| {
-            let site = sites[r] as usize;
-            self.linear.add_row(site, row);
-            if let Some(scale) = self.model.row_scale() {
-                row.scale(scale[site]);
-            }
-        })
     }
 }

@@ -25,7 +25,7 @@ use super::{
     seam::{Side, sides},
 };
 use crate::{
-    assembly::Row,
+    assembly::{Centre, Row},
     mesh::Mesh,
     model::bond_cutting::WholeFamily,
     tensor::{Tensor, Vector},
@@ -190,13 +190,16 @@ impl<const D: usize> EdgeCorrection<D> {
     pub fn add_row(&self, site: usize, row: &mut Row<D>) {
         for &s in self.of_site.get(&(site as u32)).into_iter().flatten() {
             let string = &self.list[s as usize];
-            for other in string.sites {
-                if other as usize == site {
-                    row.add_site(other, &string.block);
-                } else {
-                    row.add_site(other, &(-string.block));
+            let add = |row: &mut Row<D>| {
+                for other in string.sites {
+                    if other as usize == site {
+                        row.add_site(other, &string.block);
+                    } else {
+                        row.add_site(other, &(-string.block));
+                    }
                 }
-            }
+            };
+            row.part(|| Some(Centre::Site(string.sites[0])), add);
         }
     }
 }

@@ -17,7 +17,7 @@ use crate::coupling::truncated::lps_constants::{
 };
 use crate::coupling::truncated::springs::BySite;
 use crate::{
-    assembly::Row,
+    assembly::{Centre, Row},
     fem,
     tensor::{Tensor, Vector},
 };
@@ -29,6 +29,8 @@ pub(super) struct Dilatations<const D: usize> {
     entries: Vec<(u32, Vector<D>)>,
     /// True for those that only subtract what an element's own energy contains already.
     taken_back: Vec<bool>,
+    /// The point or the element of each.
+    centre: Vec<Centre>,
     of_site: BySite,
 }
 
@@ -68,6 +70,7 @@ impl<const D: usize> Dilatations<D> {
             offsets: vec![0],
             entries: Vec::new(),
             taken_back: Vec::new(),
+            centre: Vec::new(),
             of_site: BySite::new(sites, 0, |_, _| ()),
         }
     }
@@ -84,33 +87,42 @@ impl<const D: usize> Dilatations<D> {
             let of_other = other
                 .as_ref()
                 .map(|(c, (functionals, volumes))| (*c, &functionals[&carrier], volumes));
+            let centre = match carrier {
+                Carrier::Point(i) => Centre::Site(segments.site[i as usize]),
+                Carrier::Cell(cell) => Centre::Cell(cell),
+            };
             match carrier {
                 Carrier::Point(i) => {
                     let stiffness = stiffness_of_point(segments, i);
                     match of_other {
-                        None => found.push(stiffness, &handed, false),
+                        None => found.push(centre, stiffness, &handed, false),
                         Some((_, other, _)) => {
                             let state = segments.body.state(i as usize);
                             let c = state.and_then(deviatoric_of).unwrap_or(0.0)
                                 * segments.body.cloud.volume[i as usize];
-                            found.push_two([stiffness - c, c], [(&handed, 1.0), (other, 1.0)]);
+                            found.push_two(
+                                centre,
+                                [stiffness - c, c],
+                                [(&handed, 1.0), (other, 1.0)],
+                            );
                         }
                     }
                 }
                 Carrier::Cell(cell) => {
                     let (own, size) = divergence(segments, cell);
-                    found.push(-common.bulk / size, &own, true);
+                    found.push(centre, -common.bulk / size, &own, true);
                     let whole = |handed: &Functional<D>, volumes: &BTreeMap<u32, f64>| {
                         let size = size + volumes.get(&cell).copied().unwrap_or(0.0);
                         (combined(&own, handed, 1.0), size)
                     };
                     let (first, size) = whole(&handed, &volumes);
                     match of_other {
-                        None => found.push(common.bulk / size, &first, false),
+                        None => found.push(centre, common.bulk / size, &first, false),
                         Some((c, other, volumes)) => {
                             // points on a face contribute different volumes to the two
                             let (other, other_size) = whole(other, volumes);
                             found.push_two(
+                                centre,
                                 [common.bulk + c, c],
                                 [(&first, size), (&other, other_size)],
                             );
@@ -133,12 +145,17 @@ impl<const D: usize> Dilatations<D> {
     }
 
     /// `½ κ θ² + ½ c (θ − θ_σ)² − ½ c θ_σ²` of the integrals of θ and θ_σ over these volumes.
-    fn push_two(&mut self, [kappa, c]: [f64; 2], [theta, sigma]: [(&Functional<D>, f64); 2]) {
+    fn push_two(
+        &mut self,
+        centre: Centre,
+        [kappa, c]: [f64; 2],
+        [theta, sigma]: [(&Functional<D>, f64); 2],
+    ) {
         let [size, other] = [theta.1, sigma.1];
-        self.push(kappa / size, theta.0, false);
+        self.push(centre, kappa / size, theta.0, false);
         let difference = combined(theta.0, sigma.0, -size / other);
-        self.push(c / size, &difference, false);
-        self.push(-c / other, sigma.0, false);
+        self.push(centre, c / size, &difference, false);
+        self.push(centre, -c / other, sigma.0, false);
     }
 
     /// Returns true if no energy is negative but those that an element has already: the volume that pieces add to an element may be negative.
@@ -147,7 +164,14 @@ impl<const D: usize> Dilatations<D> {
         all.filter(|(_, back)| !**back).all(|(k, _)| *k >= 0.0)
     }
 
-    fn push(&mut self, stiffness: f64, functional: &Functional<D>, taken_back: bool) {
+    fn push(
+        &mut self,
+        centre: Centre,
+        stiffness: f64,
+        functional: &Functional<D>,
+        taken_back: bool,
+    ) {
+        self.centre.push(centre);
         self.stiffness.push(stiffness);
         self.taken_back.push(taken_back);
         self.entries
@@ -173,10 +197,13 @@ impl<const D: usize> Dilatations<D> {
                 continue;
             };
             let b = entries[own].1 * self.stiffness[f];
-            for (other, c) in entries {
-                let block: Tensor<D> = b * c.transpose();
-                row.add_site(*other, &block);
-            }
+            let add = |row: &mut Row<D>| {
+                for (other, c) in entries {
+                    let block: Tensor<D> = b * c.transpose();
+                    row.add_site(*other, &block);
+                }
+            };
+            row.part(|| Some(self.centre[f]), add);
         }
     }
 }

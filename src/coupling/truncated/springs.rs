@@ -182,7 +182,10 @@ impl<const D: usize> Springs<D> {
                 .map_or(0.0, |(_, w)| w);
             let xi = &self.direction[s];
             let block: Tensor<D> = xi * xi.transpose() * (self.stiffness[s] * weight);
-            row.add(&self.difference, s, &block);
+            row.part(
+                || self.difference.heaviest(s),
+                |row| row.add(&self.difference, s, &block),
+            );
         }
     }
 }

@@ -95,7 +95,6 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
             force: force.as_slice(),
             relative,
             difference: None,
-            expands: self.rest.stresses.thermal.is_some(),
         };
         let balance = out_of_balance(&imbalance, self.traits);
         let balance = balance.filter(|_| is_loaded);

@@ -123,11 +123,10 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         };
         let (mut moving, pace, growth) = paced(spec, &asked, moving, &held, known, choices)?;
         self.setup.lap("stable step");
-        let system = (moving.system.as_ref(), moving.is_linear);
         let drive = driven(model, rest, &begin.u, &pace, spec)?.heated(
             rest.stresses.thermal.as_ref(),
             self.operator,
-            system,
+            moving.is_linear,
         )?;
         if drive.evaluates_everywhere() {
             self.setup.choices.push(Decision {

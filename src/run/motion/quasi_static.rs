@@ -110,7 +110,7 @@ fn load_steps<const D: usize>(
     leads.time(&mut watch, &mut timings);
     let thermal = rest.stresses.thermal.as_ref();
     let drive = driven(model, rest, &begin.u, spec)?;
-    let drive = drive.heated(thermal, operator, (system.as_ref(), is_linear))?;
+    let drive = drive.heated(thermal, operator, is_linear)?;
     let at = saved.as_ref();
     restore(system.as_mut(), at, &file)?;
     let breaks = breaks(system.as_ref(), rest);

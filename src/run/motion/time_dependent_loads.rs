@@ -2,8 +2,6 @@
 
 #![deny(clippy::wildcard_enum_match_arm)]
 
-use std::borrow::Cow;
-
 use super::driven_impactors::{DrivenImpactors, prescribed};
 use super::way::Way;
 use crate::run::error::RunError;
@@ -12,7 +10,6 @@ use crate::run::thermal::{ExpandingRows, Thermal};
 use crate::scene::conditions::{Condition, Prescribed};
 use crate::scene::impactors::Impactor;
 use crate::solve::explicit::Drive;
-use crate::system::SemiDiscrete;
 use crate::tensor::Vector;
 use crate::{coupling::Operator, model::Model};
 
@@ -31,7 +28,7 @@ pub struct SceneDrive<'a, const D: usize> {
     /// Loads that depend on time and place.
     by_both: Vec<usize>,
     /// Expansion by a temperature that changes, and the rows of all sites.
-    heat: Option<(&'a Thermal<D>, ExpandingRows<'a>)>,
+    heat: Option<(&'a Thermal<D>, ExpandingRows<D>)>,
     prescribed: Vec<u32>,
     /// The condition that holds each prescribed dof.
     holder: Vec<u32>,
@@ -159,7 +156,7 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
         })
     }
 
-    /// With the forces of thermal expansion, by the rows of `operator` and of `system`, the bonds of which know their temperature unless it `is_linear`.
+    /// With the forces of thermal expansion, by the rows of `operator`, the bonds of the body knowing their temperature unless all `is_linear`.
     ///
     /// # Errors
     /// [`RunError::Later`] for materials that expand differently where the coupling does not count them.
@@ -167,18 +164,17 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
         mut self,
         thermal: Option<&'a Thermal<D>>,
         operator: &Operator<'_, D>,
-        (system, is_linear): (&dyn SemiDiscrete, bool),
+        is_linear: bool,
     ) -> Result<Self, RunError> {
         let Some(thermal) = thermal else {
             return Ok(self);
         };
-        let sites: Vec<u32> = (0..self.model.sites.len() as u32).collect();
-        let alike = || Cow::Owned(system.rows_that_expand(&sites));
-        let rows = thermal.rows(self.model, operator, None, !is_linear, alike)?;
+        let rows = (operator, None);
         if thermal.temperature.value.depends_on_time() {
+            let rows = thermal.rows(self.model, rows, !is_linear)?;
             self.heat = Some((thermal, rows));
         } else {
-            let forces = thermal.forces(self.model, &rows, None, 0.0);
+            let forces = thermal.forces_at(self.model, rows, !is_linear, 0.0)?;
             let loads = self.steady.iter_mut().zip(forces);
             loads.for_each(|(load, f)| *load += f);
         }
@@ -303,7 +299,7 @@ impl<const D: usize> Drive for SceneDrive<'_, D> {
             self.loads.add_condition(condition, number, time, load);
         }
         if let Some((thermal, rows)) = &self.heat {
-            let forces = thermal.forces(self.model, rows, None, time);
+            let forces = thermal.forces(self.model, rows, time);
             load.iter_mut().zip(forces).for_each(|(load, f)| *load += f);
         }
     }
