@@ -154,3 +154,39 @@ fn families_of_correspondence_end_at_a_staircase() {
         assert!(error < LIMIT, "radius {radius}: {error:e}");
     }
 }
+
+/// Balls between two planes of symmetry: steps of their staircases have one cell, whose nodes all belong to faces of lower axes.
+#[test]
+fn balls_between_planes_of_symmetry_leave_a_uniform_stress_exact() {
+    let (stress, modulus, ratio) = (100.0, 210e3, 0.3);
+    for (center, radius) in [([17.18, 14.41, 10.60], 7.17), ([15.63, 27.40, 8.51], 9.32)] {
+        let solution = SceneBuilder::solid("ball")
+            .set("mesh.box.min", [0.0; 3])
+            .set("mesh.box.max", [40.0, 40.0, 20.0])
+            .set("mesh.box.x.cells", 8)
+            .set("mesh.box.y.cells", 8)
+            .set("mesh.box.z.cells", 4)
+            .set("mesh.box.cell", "tet4")
+            .set("zones.rim", "own")
+            .nonlocal(Region::ball(center, radius))
+            .material("steel", Material::lps(modulus, ratio))
+            .horizon(4.5)
+            .coupling("truncated")
+            .condition("back", Condition::displacement("back").z(0.0))
+            .condition("front", Condition::displacement("front").z(0.0))
+            .condition("left", Condition::displacement("left").x(0.0))
+            .condition("bottom", Condition::displacement("bottom").y(0.0))
+            .condition("right", Condition::traction("right").x(stress))
+            .solve(&Silent)
+            .unwrap_or_else(|refused| panic!("{center:?} {radius}: {refused}"));
+        // plane strain
+        let (along, across) = (1.0 - ratio * ratio, ratio * (1.0 + ratio));
+        let strain = stress / modulus;
+        let error = error(&solution, |x| {
+            [strain * along * x[0], -strain * across * x[1], 0.0]
+        });
+        println!("{center:?} {radius}: {error:e}");
+        // rows of a part take of those of the next one, along a whole staircase: rounding grows to 6e-11
+        assert!(error < 1e-9, "{center:?} {radius}: {error:e}");
+    }
+}

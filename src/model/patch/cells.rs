@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{error::PatchError, places::Places};
+use super::{error::PatchError, places::Places, plane_parts};
 use crate::{
     mesh::Mesh,
     model::simplex::{Cells, Simplex, simplices_of},
@@ -44,6 +44,8 @@ pub(super) struct PatchCells<const D: usize> {
     limits: (Index<D>, Index<D>),
     /// True as long as no cell beyond was asked for.
     is_known: bool,
+    /// True if nodes belong to plane parts by an order of these (`plane_parts.rs`), instead of by their axes.
+    orders_parts: bool,
 }
 
 /// A face of a cell.
@@ -84,7 +86,7 @@ impl<const D: usize> PatchCells<D> {
     pub fn new(
         mesh: &Mesh<D>,
         cells: Cells<D>,
-        (width, has_skin): (i32, bool),
+        (width, has_skin, orders_parts): (i32, bool, bool),
         (low, high): (Vector<D>, Vector<D>),
         places: &Places<'_, D>,
     ) -> Result<Self, PatchError> {
@@ -118,6 +120,7 @@ impl<const D: usize> PatchCells<D> {
             prescribed: BTreeSet::new(),
             limits,
             is_known: true,
+            orders_parts,
         };
         patch.zone = (wanted.into_iter())
             .filter(|index| patch.is_material(index))
@@ -299,6 +302,10 @@ impl<const D: usize> PatchCells<D> {
 
     /// The axis of the plane part of Γ that each node of it belongs to: the lowest, unless in 2D a face of another part would keep no node, and those of the lowest keep another.
     pub fn axes(&self, faces: &[Face<D>]) -> BTreeMap<Index<D>, usize> {
+        if self.orders_parts {
+            let faces: Vec<_> = faces.iter().map(|f| (f.axis, f.nodes())).collect();
+            return plane_parts::axes(&faces, |node| self.may_follow(node));
+        }
         let mut axes = BTreeMap::new();
         let mut around: BTreeMap<Index<D>, Vec<usize>> = BTreeMap::new();
         for (f, face) in faces.iter().enumerate() {

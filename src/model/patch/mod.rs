@@ -6,6 +6,7 @@
 //! | `cells.rs` | cells of the zone, the rim around them, and the faces Γ of the rim |
 //! | `replaced.rs` | cells of second order that the patch meets, linear with straight sides; quadrilaterals and hexahedra that it cuts, divided |
 //! | `cuts.rs` | elements that Γ cuts: what is left of them |
+//! | `plane_parts.rs` | plane parts of Γ, in an order in which rows of their nodes resolve |
 //! | `tie.rs` | the displacement of the nodes of Γ, by a dual mortar |
 //! | `followers.rs` | nodes that no good element holds |
 //! | `sides.rs` | nodes inside the patch that elements on different sides share |
@@ -22,7 +23,7 @@
 //! ```
 //!
 //! with functions ψ that are dual to the shape functions on each plane part of Γ \[Wohlmuth2000\] and add up to one, so that the tie carries a constant traction and the patch test passes. Each node of Γ has a row of its own. A node where parts of Γ
-//! with different normals meet belongs to the part whose axis comes first. Nodes of the mesh with no element of which enough is left follow the nearest one that has, as in aggregated cut elements \[Badia2018\].
+//! with different normals meet belongs to the part whose axis comes first, or, where the patch would have to grow too far for that, to the first by an order of the parts. Nodes of the mesh with no element of which enough is left follow the nearest one that has, as in aggregated cut elements \[Badia2018\].
 //! All of this is the transfer T of the model, and constant.
 
 mod cells;
@@ -33,6 +34,7 @@ mod followers;
 mod left;
 mod moments;
 mod places;
+mod plane_parts;
 mod replaced;
 mod rows;
 mod sides;
@@ -94,12 +96,26 @@ pub fn embed<const D: usize>(
     places: Places<'_, D>,
     material: &dyn Fn(u32) -> u16,
 ) -> Result<Patched<D>, PatchError> {
+    match grown(mesh, lattice, places, material, false) {
+        Err(first) if D == 3 => grown(mesh, lattice, places, material, true).map_err(|_| first),
+        found => found,
+    }
+}
+
+/// The same with nodes of the rim that belong to plane parts by their axes, or by an order of the parts: the patch then grows less, where a staircase has steps of one cell.
+fn grown<const D: usize>(
+    mesh: &Mesh<D>,
+    lattice: PatchLattice<D>,
+    places: Places<'_, D>,
+    material: &dyn Fn(u32) -> u16,
+    orders_parts: bool,
+) -> Result<Patched<D>, PatchError> {
     let cells = lattice.cells(&mesh.bounds().0);
     let width = 1 + (lattice.reach / cells.spacing - 1e-6).ceil() as i32;
     let mut patch = PatchCells::new(
         mesh,
         cells,
-        (width, lattice.has_skin),
+        (width, lattice.has_skin, orders_parts),
         lattice.within,
         &places,
     )?;

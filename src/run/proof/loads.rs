@@ -46,7 +46,7 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
     };
     let (mut worst, masses) = mass(model, &subject.rest.density, &mut part);
     // in equilibrium masses play no part; a load on a row that is no derivative of an energy does, whose scale is that of its part of the body
-    let moves = subject.system.is_some();
+    let moves = subject.rest.is_in_time;
     let has_energy = subject.coupling.symmetry() == Symmetry::Symmetric;
     let mut is_needed = vec![moves; masses.len()];
     let loads = Loads::new(model, conditions, BodyForces::Consistent)?;
