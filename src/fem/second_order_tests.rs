@@ -17,7 +17,16 @@ fn is_read<const D: usize>(name: &str, shape: CellShape, cells: usize, outer: us
     let read_all = |order: Order| -> Vec<Mesh<D>> {
         let path = |format: &str| fixture(&format!("ring_{name}_{format}.msh"));
         (formats.iter())
-            .map(|format| read::read_of(&path(format), order).unwrap())
+            .map(|format| {
+                read::read_with(
+                    &path(format),
+                    &read::Options {
+                        order,
+                        ..read::Options::default()
+                    },
+                )
+                .unwrap()
+            })
             .collect()
     };
     let volume = |mesh: &Mesh<D>| -> f64 {

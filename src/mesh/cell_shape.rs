@@ -106,6 +106,28 @@ impl CellShape {
         self != self.linear()
     }
 
+    /// The nodes of the same cell the other way round.
+    pub(super) fn reversed(self) -> Vec<usize> {
+        let corners: &[usize] = match self.linear() {
+            Self::Line2 => &[1, 0],
+            Self::Tri3 => &[0, 2, 1],
+            Self::Quad4 => &[0, 3, 2, 1],
+            Self::Tet4 => &[0, 2, 1, 3],
+            Self::Hex8 => &[4, 5, 6, 7, 0, 1, 2, 3],
+            _ => &[0],
+        };
+        let is_edge =
+            |a: usize, b: usize| move |side: &[usize; 2]| *side == [a, b] || *side == [b, a];
+        let sides = self.mid_sides().iter().map(|&[p, q]| {
+            let of = self
+                .mid_sides()
+                .iter()
+                .position(is_edge(corners[p], corners[q]));
+            corners.len() + of.unwrap_or(0)
+        });
+        corners.iter().copied().chain(sides).collect()
+    }
+
     /// The local ends of the edge of each node after the corners.
     pub fn mid_sides(self) -> &'static [[usize; 2]] {
         self.geometry().mid_sides

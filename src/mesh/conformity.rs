@@ -10,11 +10,15 @@ use crate::tensor::Vector;
 /// A node this near to a facet lies on it, over the longest side of the facet.
 const ON_FACET: f64 = 1e-6;
 
-/// Refuses a facet of three cells, and a node that lies on a facet at the boundary of its body of which it is none.
+/// Refuses a facet of three cells, and a node that lies on a facet at the boundary of its body of which it is none; `twins` has for each node the first one at its place.
 ///
 /// # Errors
 /// [`MeshError::CrowdedFacet`], [`MeshError::HangingNode`].
-pub(super) fn check<const D: usize>(mesh: &Mesh<D>, bodies: &[u32]) -> Result<(), MeshError> {
+pub(super) fn check<const D: usize>(
+    mesh: &Mesh<D>,
+    bodies: &[u32],
+    twins: &[u32],
+) -> Result<(), MeshError> {
     if D == 1 {
         return Ok(());
     }
@@ -34,7 +38,7 @@ pub(super) fn check<const D: usize>(mesh: &Mesh<D>, bodies: &[u32]) -> Result<()
             }
         }
     }
-    check_nodes(mesh, &outer, bodies)
+    check_nodes(mesh, &outer, bodies, twins)
 }
 
 /// Looks for nodes at the boundary that lie on facets of others: along a skew line, on which grids do not pile up.
@@ -42,6 +46,7 @@ fn check_nodes<const D: usize>(
     mesh: &Mesh<D>,
     outer: &[BoundaryFacet],
     bodies: &[u32],
+    twins: &[u32],
 ) -> Result<(), MeshError> {
     let line: Vector<D> = Vector::from_fn(|k, _| [1.0, 0.618_033_988_7, 0.324_717_957_2][k]);
     let mut nodes: Vec<u32> = outer.iter().flat_map(|f| f.nodes.iter().copied()).collect();
@@ -69,7 +74,8 @@ fn check_nodes<const D: usize>(
             let x = place(n);
             let is_outside = (0..D).any(|k| x[k] < low[k] - reach || x[k] > high[k] + reach);
             let is_other = bodies[n as usize] != bodies[facet.nodes[0] as usize];
-            if is_outside || is_other || facet.nodes.contains(&n) {
+            let is_own = |m: &u32| twins[*m as usize] == twins[n as usize];
+            if is_outside || is_other || facet.nodes.iter().any(is_own) {
                 continue;
             }
             let mut triangles = vec![corners.clone()];
@@ -98,7 +104,8 @@ mod tests {
 
     /// Of a mesh that is one body.
     fn check<const D: usize>(mesh: &Mesh<D>) -> Result<(), MeshError> {
-        super::check(mesh, &vec![0; mesh.nodes.len()])
+        let own: Vec<u32> = (0..mesh.nodes.len() as u32).collect();
+        super::check(mesh, &vec![0; mesh.nodes.len()], &own)
     }
 
     /// Quadrilaterals by their corners.
@@ -139,7 +146,8 @@ mod tests {
         apart.nodes.extend(others.map(Vector::<2>::from));
         apart.push_cell(CellShape::Quad4, &[4, 5, 6, 7]);
         assert!(check(&apart).is_err());
-        assert!(super::check(&apart, &apart.bodies()).is_ok());
+        let own: Vec<u32> = (0..apart.nodes.len() as u32).collect();
+        assert!(super::check(&apart, &apart.bodies(), &own).is_ok());
     }
 
     #[test]

@@ -40,7 +40,7 @@ pub enum MeshError {
         source: std::io::Error,
     },
     /// The file name ends in nothing that a reader knows.
-    #[error("{}: no reader for this file extension; use .msh (Gmsh 4.1 or 2.2), .inp (Abaqus, CalculiX), .vtk or .vtu", path.display())]
+    #[error("{}: no reader for this file extension; use .msh (Gmsh 4.1 or 2.2), .inp (Abaqus, CalculiX), .vtk, .vtu or .vti", path.display())]
     UnknownExtension {
         /// The file.
         path: PathBuf,
@@ -289,7 +289,7 @@ pub enum MeshError {
     },
     /// Two nodes at one place.
     #[error(
-        "nodes {first} and {second} both lie at {position} ({distance:.3e} apart; counted from 0); merge them (in Gmsh: Coherence Mesh; in a deck: Merge Instances), or leave a gap between parts that are not bonded; separate parts that touch need contact = {{}}"
+        "nodes {first} and {second} both lie at {position} ({distance:.3e} apart; counted from 0); merge them (mesh.file.merge = 1e-9; in Gmsh: Coherence Mesh; in a deck: Merge Instances), or leave a gap between parts that are not bonded; separate parts that touch need contact = {{}}"
     )]
     CoincidentNodes {
         /// Number of one, from 0.
@@ -365,6 +365,21 @@ pub enum MeshError {
         /// The mean of their places.
         position: String,
     },
+}
+
+impl MeshError {
+    /// The cells and the nodes of the mesh that it speaks of, counted from 0.
+    pub fn numbers(&self) -> [Vec<u32>; 2] {
+        match self {
+            Self::Inverted { cell, .. }
+            | Self::Degenerate { cell, .. }
+            | Self::Thin { cell, .. } => [vec![*cell as u32], Vec::new()],
+            Self::CoincidentNodes { first, second, .. } => [Vec::new(), vec![*first, *second]],
+            Self::CrowdedFacet { cell, .. } => [vec![*cell], Vec::new()],
+            Self::HangingNode { node, cell, .. } => [vec![*cell], vec![*node]],
+            _ => [Vec::new(), Vec::new()],
+        }
+    }
 }
 
 /// A position as text: `(x, y)`.

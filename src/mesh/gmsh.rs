@@ -9,7 +9,7 @@ use std::path::Path;
 
 use super::MeshError;
 use super::gmsh_kinds::{reorder, shape};
-use crate::mesh::raw::{Encoding, RawElement, RawMesh, RawNode, Source};
+use crate::mesh::raw::{Encoding, RawMesh, RawNode, Source};
 
 /// Remedy for a wrong word in a text file.
 const REWRITE: &str = "correct it or write the file again with Gmsh";
@@ -118,7 +118,23 @@ impl<'a> Reader<'a> {
                 return Err(self.truncated(&format!("a section ${wanted}")));
             }
         }
+        self.tell_lost_groups();
         Ok(())
+    }
+
+    /// Notes that a file of version 2 names groups and has elements of none: Gmsh writes it so with Mesh.SaveAll.
+    fn tell_lost_groups(&mut self) {
+        let is_lost = self.version == Version::Two && self.raw.groups.len() == 1;
+        if !is_lost || self.names.is_empty() {
+            return;
+        }
+        let mut names: Vec<&str> = self.names.values().map(String::as_str).collect();
+        names.sort_unstable();
+        self.raw.notes.push(format!(
+            "{}: no element belongs to any of the physical groups {}: in version 2.2 Gmsh writes none with Mesh.SaveAll; write version 4.1, or without SaveAll",
+            self.source.path.display(),
+            names.join(", ")
+        ));
     }
 
     fn format(&mut self) -> Result<(), MeshError> {
@@ -259,6 +275,7 @@ impl<'a> Reader<'a> {
         let total = self.size("the number of elements")?;
         self.size("the smallest element tag")?;
         self.size("the largest element tag")?;
+        let mut nodes = Vec::new();
         for _ in 0..blocks {
             let dimension = self.integer("the dimension of an entity")?;
             let entity = self.integer("the tag of an entity")?;
@@ -276,22 +293,15 @@ impl<'a> Reader<'a> {
                 let at = self.next_at();
                 let tag = self.size("an element tag")? as u64;
                 let shape = shape(kind).map_err(|e| self.element_error(kind_at, tag, kind, e))?;
-                let start = self.raw.element_nodes.len();
+                nodes.clear();
                 for _ in 0..shape.node_count() {
-                    let node = self.size("a node of an element")? as u64;
-                    self.raw.element_nodes.push(node);
+                    nodes.push(self.size("a node of an element")? as u64);
                 }
-                reorder(shape, &mut self.raw.element_nodes[start..]);
-                self.raw.elements.push(RawElement {
-                    tag,
-                    shape,
-                    start,
-                    group,
-                    at,
-                });
+                reorder(shape, &mut nodes);
+                self.raw.push((tag, group, at), shape, &nodes);
             }
         }
-        self.check_total(self.raw.elements.len(), total, "elements")
+        self.check_total(self.raw.count(), total, "elements")
     }
 
     /// The count of a section of version 2, which is text in both encodings.
@@ -315,7 +325,8 @@ impl<'a> Reader<'a> {
     fn elements_2(&mut self) -> Result<(), MeshError> {
         let total = self.count_2("the number of elements")?;
         let text = self.source.encoding == Encoding::Text;
-        while self.raw.elements.len() < total {
+        let mut nodes = Vec::new();
+        while self.raw.count() < total {
             // in binary one header serves several elements; in text each element is its own block
             let mut at = self.next_at();
             let mut tag = if text {
@@ -352,19 +363,12 @@ impl<'a> Reader<'a> {
                     vec![physical]
                 };
                 let group = self.group_list(shape.dimension(), groups);
-                let start = self.raw.element_nodes.len();
+                nodes.clear();
                 for _ in 0..shape.node_count() {
-                    let node = self.integer("a node of an element")? as u64;
-                    self.raw.element_nodes.push(node);
+                    nodes.push(self.integer("a node of an element")? as u64);
                 }
-                reorder(shape, &mut self.raw.element_nodes[start..]);
-                self.raw.elements.push(RawElement {
-                    tag: tag as u64,
-                    shape,
-                    start,
-                    group,
-                    at,
-                });
+                reorder(shape, &mut nodes);
+                self.raw.push((tag as u64, group, at), shape, &nodes);
             }
         }
         Ok(())

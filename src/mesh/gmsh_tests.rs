@@ -290,8 +290,8 @@ fn wrong_files_name_place_value_and_remedy() {
         ),
         (
             "3 2 2 6",
-            "3 7 2 6",
-            ["line 19", "(pyramid)", "supported are"],
+            "3 14 2 6",
+            ["line 19", "(second-order pyramid)", "ElementOrder"],
         ),
         (
             "3 2 2 6",

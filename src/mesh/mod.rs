@@ -6,16 +6,19 @@
 //! | `generate.rs` | line, rectangle and box with cut-outs and grading |
 //! | `read.rs` | one entry for all files |
 //! | `raw.rs` | content of a file before it is a mesh |
+//! | `mend.rs` | nodes merged, cells split and turned |
 //! | `parts.rs` | a mesh in memory, as another program hands it over |
 //! | `gmsh.rs`, `gmsh_kinds.rs` | Gmsh MSH 4.1 and 2.2, ASCII and binary |
 //! | `inp/` | decks of Abaqus and CalculiX: nodes, elements, sets, surfaces, instances |
 //! | `vtk.rs`, `vtk_grid.rs` | VTK files: cells, and groups of them by integers |
 //! | `vtu.rs`, `vtk_legacy.rs` | their two formats, `.vtu` and `.vtk` |
+//! | `vtk_image.rs` | images (`.vti`), whose voxels are cells |
 //! | `vtu_data.rs`, `xml.rs` | data and tags of the former |
 //! | `quality.rs` | checks that refuse a mesh no element can live on |
 //! | `facet.rs` | a facet seen from its cell |
 //! | `boundary.rs` | boundary and interface facets, distances to them |
 //! | `bodies.rs` | nodes that cells hold together |
+//! | `twins.rs` | nodes at one place: cracks that the mesher made |
 //! | `conformity.rs` | conformity of cells, which have to meet face to face |
 //! | `visibility.rs` | bonds that leave the mesh |
 //! | `dilate_erode.rs` | sets of cells that grow and shrink |
@@ -38,14 +41,17 @@ pub mod generate;
 pub mod gmsh;
 mod gmsh_kinds;
 mod inp;
+mod mend;
 mod order;
 mod parts;
 pub mod quality;
 pub(crate) mod raw;
 pub mod read;
+mod twins;
 pub mod visibility;
 pub mod vtk;
 pub(crate) mod vtk_grid;
+mod vtk_image;
 mod vtk_legacy;
 mod vtu;
 mod vtu_data;

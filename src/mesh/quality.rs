@@ -1,6 +1,7 @@
 //! Sizes and shapes of cells, and the checks that refuse a mesh no element can live on.
 
 use super::error::position;
+use super::twins::Twins;
 use super::{Mesh, MeshError, cell_shape::MOST_CORNERS, conformity};
 use crate::tensor::{Tensor, Vector, determinant, padded};
 
@@ -12,9 +13,6 @@ pub const SMALLEST_SCALED_JACOBIAN: f64 = 1e-12;
 /// A cell whose longest edge is more than this many times its shortest is too thin: round-off of an even stretch grows like 6e-16 times the square of
 /// that ratio (`bondline verify extremes`), so that 1e-6 of it would be wrong.
 pub const LARGEST_EDGE_RATIO: f64 = 3e4;
-
-/// Nodes closer than this fraction of the mesh's largest extent lie at one place.
-const COINCIDENT: f64 = 1e-12;
 
 /// Quality of a mesh, as [`check`] measures it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,14 +74,18 @@ impl<const D: usize> Mesh<D> {
 /// Named by number, place and value: a reference to a node or cell that does not exist, a coordinate that is no number,
 /// a node without a cell, two nodes at one place, an inverted or degenerate cell, cells that do not meet face to face.
 pub fn check<const D: usize>(mesh: &Mesh<D>) -> Result<Quality, MeshError> {
-    check_bodies(mesh, false)
+    check_bodies(mesh, false, false)
 }
 
-/// As [`check`], of bodies that may touch each other, with nodes at one place or on faces of another, where `may_touch`.
+/// As [`check`], of bodies that may touch each other, with nodes at one place or on faces of another, where `may_touch`. Nodes of a body at one place are taken where they lie along a crack, or where they `may_coincide`.
 ///
 /// # Errors
 /// As [`check`].
-pub fn check_bodies<const D: usize>(mesh: &Mesh<D>, may_touch: bool) -> Result<Quality, MeshError> {
+pub fn check_bodies<const D: usize>(
+    mesh: &Mesh<D>,
+    may_touch: bool,
+    may_coincide: bool,
+) -> Result<Quality, MeshError> {
     check_references(mesh)?;
     for (node, x) in mesh.nodes.iter().enumerate() {
         if !x.iter().all(|v| v.is_finite()) {
@@ -104,7 +106,19 @@ pub fn check_bodies<const D: usize>(mesh: &Mesh<D>, may_touch: bool) -> Result<Q
     } else {
         vec![0; mesh.nodes.len()]
     };
-    check_coincidence(mesh, &bodies)?;
+    let twins = Twins::of(mesh, &bodies);
+    if let Some(([first, second], _)) = twins.pair
+        && !may_coincide
+        && !twins.lie_along_cracks(mesh)
+    {
+        let place = |n: u32| mesh.nodes[n as usize];
+        return Err(MeshError::CoincidentNodes {
+            first,
+            second,
+            position: position(place(first).as_slice()),
+            distance: (place(first) - place(second)).norm(),
+        });
+    }
     let mut quality = Quality {
         shortest_edge: f64::INFINITY,
         longest_edge: 0.0,
@@ -140,7 +154,7 @@ pub fn check_bodies<const D: usize>(mesh: &Mesh<D>, may_touch: bool) -> Result<Q
         quality.volume += volume;
     }
     check_thickness(mesh)?;
-    conformity::check(mesh, &bodies)?;
+    conformity::check(mesh, &bodies, &twins.first)?;
     Ok(quality)
 }
 
@@ -212,38 +226,6 @@ fn check_references<const D: usize>(mesh: &Mesh<D>) -> Result<(), MeshError> {
     }
     for (name, set) in &mesh.node_sets {
         check(&|| format!("node set \"{name}\""), "node", set, count)?;
-    }
-    Ok(())
-}
-
-/// Refuses two nodes of a body at one place, by sorting along a skew line so that grids do not pile up on it.
-fn check_coincidence<const D: usize>(mesh: &Mesh<D>, bodies: &[u32]) -> Result<(), MeshError> {
-    let (lo, hi) = mesh.bounds();
-    let tolerance = COINCIDENT * (hi - lo).amax();
-    let line: Vector<D> = Vector::from_fn(|k, _| [1.0, 0.618_033_988_7, 0.324_717_957_2][k]);
-    let mut order: Vec<(f64, u32)> = mesh
-        .nodes
-        .iter()
-        .enumerate()
-        .map(|(i, x)| (x.dot(&line), i as u32))
-        .collect();
-    order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-    let reach = tolerance * line.norm();
-    for (k, &(s, i)) in order.iter().enumerate() {
-        for &(t, j) in &order[k + 1..] {
-            if t - s > reach {
-                break;
-            }
-            let distance = (mesh.nodes[i as usize] - mesh.nodes[j as usize]).norm();
-            if distance <= tolerance && bodies[i as usize] == bodies[j as usize] {
-                return Err(MeshError::CoincidentNodes {
-                    first: i.min(j),
-                    second: i.max(j),
-                    position: position(mesh.nodes[i as usize].as_slice()),
-                    distance,
-                });
-            }
-        }
     }
     Ok(())
 }

@@ -2,10 +2,11 @@
 
 use super::error::axis_name;
 use super::{CellShape, Facet, Mesh, MeshError, Order, Place};
+use crate::regular_file;
 use crate::tensor::Vector;
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Tolerance of a node of a 2D mesh out of its plane, as a fraction of the mesh's extent.
 const OUT_OF_PLANE: f64 = 1e-12;
@@ -110,6 +111,21 @@ impl<'a> Source<'a> {
     }
 }
 
+/// The bytes of a file, without the mark that some editors put before a text in UTF-8.
+///
+/// # Errors
+/// [`MeshError::Open`].
+pub(super) fn bytes_of(path: &Path) -> Result<Vec<u8>, MeshError> {
+    let mut bytes = regular_file::read(path).map_err(|source| MeshError::Open {
+        path: path.into(),
+        source,
+    })?;
+    if bytes.starts_with(b"\xef\xbb\xbf") {
+        bytes.drain(..3);
+    }
+    Ok(bytes)
+}
+
 /// A node as the file holds it.
 pub(super) struct RawNode {
     pub tag: u64,
@@ -137,8 +153,66 @@ pub(super) struct RawMesh {
     pub element_nodes: Vec<u64>,
     /// Lists of set names; the first one is empty.
     pub groups: Vec<Vec<String>>,
+    /// Prisms and pyramids, which no mesh has: they are split before.
+    pub others: Vec<RawOther>,
+    /// Types of elements that were left out because they were asked to be.
+    pub left_out: Vec<String>,
     /// Notes on what the reader left out, a sentence each.
     pub notes: Vec<String>,
+}
+
+/// A cell of a shape that no mesh has.
+pub(super) struct RawOther {
+    pub tag: u64,
+    pub shape: OtherShape,
+    /// Its nodes: of a prism three, and those across; of a pyramid its base around, and its apex.
+    pub nodes: Vec<u64>,
+    /// Index of its group in [`RawMesh::groups`].
+    pub group: u32,
+    /// Byte where it stands.
+    pub at: usize,
+}
+
+/// Shapes that are split into tetrahedra.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum OtherShape {
+    Prism,
+    Pyramid,
+}
+
+/// A shape of a file.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum RawShape {
+    Cell(CellShape),
+    Other(OtherShape),
+}
+
+impl std::fmt::Debug for RawShape {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Cell(shape) => shape.fmt(f),
+            Self::Other(shape) => shape.fmt(f),
+        }
+    }
+}
+
+impl RawShape {
+    /// Number of nodes.
+    pub fn node_count(self) -> usize {
+        match self {
+            Self::Cell(shape) => shape.node_count(),
+            Self::Other(OtherShape::Prism) => 6,
+            Self::Other(OtherShape::Pyramid) => 5,
+        }
+    }
+
+    /// Topological dimension.
+    pub fn dimension(self) -> usize {
+        match self {
+            Self::Cell(shape) => shape.dimension(),
+            Self::Other(_) => 3,
+        }
+    }
 }
 
 impl Default for RawMesh {
@@ -148,6 +222,8 @@ impl Default for RawMesh {
             elements: Vec::new(),
             element_nodes: Vec::new(),
             groups: vec![Vec::new()],
+            others: Vec::new(),
+            left_out: Vec::new(),
             notes: Vec::new(),
         }
     }
@@ -177,6 +253,34 @@ fn sort_sets<const D: usize>(mesh: &mut Mesh<D>) {
 }
 
 impl RawMesh {
+    /// Appends an element: tag, group and byte where it stands, and its nodes in the order of VTK.
+    pub fn push(&mut self, (tag, group, at): (u64, u32, usize), shape: RawShape, nodes: &[u64]) {
+        match shape {
+            RawShape::Cell(shape) => {
+                self.elements.push(RawElement {
+                    tag,
+                    shape,
+                    start: self.element_nodes.len(),
+                    group,
+                    at,
+                });
+                self.element_nodes.extend_from_slice(nodes);
+            }
+            RawShape::Other(shape) => self.others.push(RawOther {
+                tag,
+                shape,
+                nodes: nodes.to_vec(),
+                group,
+                at,
+            }),
+        }
+    }
+
+    /// Number of elements, of all shapes.
+    pub fn count(&self) -> usize {
+        self.elements.len() + self.others.len()
+    }
+
     /// Gives cells the order; linear ones are without the nodes in the middle of edges, which come after the corners.
     pub(super) fn set_order(&mut self, order: Order) {
         if order == Order::Kept {
@@ -365,6 +469,16 @@ impl RawMesh {
             })
             .nth(cell)
             .map_or(0, |e| e.tag)
+    }
+
+    /// The tags of the nodes of a mesh of this dimension, in its order: of those that its cells use.
+    pub(super) fn tags_of_nodes(&self, dimension: usize) -> Vec<u64> {
+        let cells = self.elements.iter();
+        let cells = cells.filter(|e| e.shape.dimension() == dimension);
+        let tags = |e: &RawElement| &self.element_nodes[e.start..][..e.shape.node_count()];
+        let used: HashSet<u64> = cells.flat_map(tags).copied().collect();
+        let all = self.nodes.iter().map(|node| node.tag);
+        all.filter(|tag| used.contains(tag)).collect()
     }
 
     /// Refuses nodes of cells with a coordinate beyond the mesh's dimension.

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use super::raw::{Piece, RawMesh, Source};
-use super::{Mesh, MeshError, Order, gmsh, inp, vtk};
-use crate::regular_file;
+pub use super::mend::Options;
+use super::raw::{Piece, RawMesh, Source, bytes_of};
+use super::{Mesh, MeshError, gmsh, inp, mend, vtk};
 
-/// Reads a mesh of dimension `D`; the file's extension chooses the reader: `.msh`, `.inp`, `.vtk` or `.vtu`.
+/// Reads a mesh of dimension `D`; the file's extension chooses the reader: `.msh`, `.inp`, `.vtk`, `.vtu` or `.vti`.
 ///
 /// Cells are the elements of dimension `D`. Named groups of them become cell sets, groups of dimension `D − 1` facet sets,
 /// and groups of still lower dimension node sets. The cell set `all` is added unless the file has one of that name. Nodes
@@ -16,18 +16,63 @@ use crate::regular_file;
 /// See [`MeshError`]; each names the file, the place in it, the value and the remedy. The shapes of cells are not
 /// looked at here: see [`quality::check`](super::quality::check).
 pub fn read<const D: usize>(path: &Path) -> Result<Mesh<D>, MeshError> {
-    read_of(path, Order::Kept)
+    read_with(path, &Options::default())
 }
 
-/// As [`read`], with the order that cells of second order are to have.
+/// As [`read`], with options.
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_of<const D: usize>(path: &Path, order: Order) -> Result<Mesh<D>, MeshError> {
+pub fn read_with<const D: usize>(path: &Path, options: &Options) -> Result<Mesh<D>, MeshError> {
     let text = load(path)?;
-    let (mut raw, source) = parse(path, &text)?;
-    raw.set_order(order);
-    raw.assemble(&source)
+    let (mut raw, source) = parse(path, &text, options)?;
+    mend::prepare(&mut raw, &source, options)?;
+    Ok(made(&raw, &source, options)?.0)
+}
+
+/// The mesh, and its cells by their numbers among those of the file.
+fn made<const D: usize>(
+    raw: &RawMesh,
+    source: &Source,
+    options: &Options,
+) -> Result<(Mesh<D>, Vec<u32>), MeshError> {
+    let mut mesh = raw.assemble(source)?;
+    mend::turn(&mut mesh, |cell| raw.cell_tag(D, cell));
+    let is_type = |word: &&String| {
+        !raw.left_out
+            .iter()
+            .any(|own| word.eq_ignore_ascii_case(own))
+    };
+    let sets: Vec<&String> = options.ignore.iter().filter(is_type).collect();
+    let kept = mend::leave_out(&mut mesh, &sets, source)?;
+    Ok((mesh, kept))
+}
+
+/// The numbers that a file gives to some cells and nodes of its mesh, as [`read_with`] counts them, from 0.
+///
+/// # Errors
+/// As [`read`].
+pub fn numbers_in_file<const D: usize>(
+    path: &Path,
+    options: &Options,
+    (cells, nodes): (&[u32], &[u32]),
+) -> Result<[Vec<u64>; 2], MeshError> {
+    let text = load(path)?;
+    let (mut raw, source) = parse(path, &text, options)?;
+    mend::prepare(&mut raw, &source, options)?;
+    let (_, kept) = made::<D>(&raw, &source, options)?;
+    let cells = cells
+        .iter()
+        .map(|&c| raw.cell_tag(D, kept[c as usize] as usize));
+    // where cells are left out, nodes may be
+    let of_nodes = match kept.iter().zip(0..).all(|(own, c)| *own == c) {
+        true => raw.tags_of_nodes(D),
+        false => Vec::new(),
+    };
+    let nodes = nodes
+        .iter()
+        .filter_map(|&n| of_nodes.get(n as usize).copied());
+    Ok([cells.collect(), nodes.collect()])
 }
 
 /// The largest dimension of any element in the file.
@@ -36,7 +81,9 @@ pub fn read_of<const D: usize>(path: &Path, order: Order) -> Result<Mesh<D>, Mes
 /// As [`read`].
 pub fn detect_dimension(path: &Path) -> Result<usize, MeshError> {
     let text = load(path)?;
-    let (raw, source) = parse(path, &text)?;
+    let options = Options::default();
+    let (mut raw, source) = parse(path, &text, &options)?;
+    mend::prepare(&mut raw, &source, &options)?;
     raw.dimension(&source)
 }
 
@@ -56,21 +103,22 @@ fn load(path: &Path) -> Result<Loaded, MeshError> {
         let (bytes, pieces) = inp::load(path)?;
         return Ok(Loaded { bytes, pieces });
     }
-    let bytes = regular_file::read(path).map_err(|source| MeshError::Open {
-        path: path.into(),
-        source,
-    })?;
+    let bytes = bytes_of(path)?;
     let pieces = Vec::new();
     Ok(Loaded { bytes, pieces })
 }
 
-fn parse<'a>(path: &Path, text: &'a Loaded) -> Result<(RawMesh, Source<'a>), MeshError> {
+fn parse<'a>(
+    path: &Path,
+    text: &'a Loaded,
+    options: &Options,
+) -> Result<(RawMesh, Source<'a>), MeshError> {
     let bytes = &text.bytes;
     match extension(path).as_str() {
         "msh" => gmsh::parse(path, bytes),
-        "inp" => inp::parse(path, bytes, &text.pieces),
+        "inp" => inp::parse(path, (bytes, &text.pieces), &options.ignore),
         "vtk" => vtk::parse(path, bytes, vtk::Flavour::Legacy),
-        "vtu" => vtk::parse(path, bytes, vtk::Flavour::Xml),
+        "vtu" | "vti" => vtk::parse(path, bytes, vtk::Flavour::Xml),
         _ => Err(MeshError::UnknownExtension { path: path.into() }),
     }
 }

@@ -1,4 +1,4 @@
-//! VTK files: XML unstructured grids (`.vtu`, read in `vtu.rs`) and legacy ones (`.vtk`, read in `vtk_legacy.rs`), as meshio and VTK itself write them.
+//! VTK files: XML unstructured grids and images (`.vtu`, `.vti`, read in `vtu.rs`) and legacy grids (`.vtk`, read in `vtk_legacy.rs`), as meshio and VTK itself write them.
 //!
 //! VTK has no named groups. An integer value per cell becomes a set `NAME_VALUE` for each of its values: meshio's
 //! `gmsh:physical` becomes `physical_1`, `physical_2`, … (its value 0 means "no group" and makes no set), and VTK's
@@ -10,8 +10,9 @@ use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
 use super::vtk_grid::Grid;
+use super::vtk_image::{PIXEL, VOXEL};
 use super::{CellShape, MeshError, vtk_legacy, vtu};
-use crate::mesh::raw::{RawElement, RawMesh, RawNode, Source};
+use crate::mesh::raw::{OtherShape, RawMesh, RawNode, RawShape, Source};
 
 /// More different values than this make an integer array a numbering, not a grouping.
 const MOST_GROUPS: usize = 256;
@@ -21,7 +22,7 @@ const MOST_GROUPS: usize = 256;
 pub(super) enum Flavour {
     /// `.vtk`
     Legacy,
-    /// `.vtu`
+    /// `.vtu` or `.vti`
     Xml,
 }
 
@@ -60,19 +61,19 @@ fn add_piece(
             at: grid.at,
         });
     }
-    let first = raw.elements.len();
+    let first = raw.count();
     let mut shapes = Vec::with_capacity(grid.types.len());
     let mut start = 0;
     for (c, (&kind, &end)) in grid.types.iter().zip(&grid.ends).enumerate() {
         let element = (first + c) as u64;
-        let Some(shape) = CellShape::of_vtk(kind) else {
+        let Some(shape) = shape(kind) else {
             return Err(MeshError::UnsupportedElement {
                 path: source.path.clone(),
                 place: source.place(grid.at),
                 element,
                 kind: kind.to_string(),
                 name: "by VTK's numbering",
-                remedy: "supported are Vertex, Line, Triangle, Quad, Tetra and Hexahedron, and the last five as quadratic cells without nodes inside of faces: convert the mesh",
+                remedy: "supported are Vertex, Line, Triangle, Pixel, Quad, Tetra, Voxel, Hexahedron, Wedge and Pyramid, and quadratic cells without nodes inside of faces: convert the mesh",
             });
         };
         if end - start != shape.node_count() as u64 {
@@ -89,24 +90,38 @@ fn add_piece(
     }
     let groups = group_numbers(raw, &grid.cell_data, &shapes);
     let mut start = 0;
-    for ((shape, &end), group) in shapes.into_iter().zip(&grid.ends).zip(groups) {
-        raw.elements.push(RawElement {
-            tag: raw.elements.len() as u64,
-            shape,
-            start: raw.element_nodes.len(),
-            group,
-            at: grid.at,
-        });
-        let nodes = &grid.nodes[start..end as usize];
-        raw.element_nodes
-            .extend(nodes.iter().map(|n| n.saturating_add(first_node)));
+    for (((shape, &end), group), &kind) in
+        (shapes.into_iter().zip(&grid.ends).zip(groups)).zip(&grid.types)
+    {
+        let mut nodes: Vec<u64> = (grid.nodes[start..end as usize].iter())
+            .map(|n| n.saturating_add(first_node))
+            .collect();
+        // along the axes, one after another, instead of around
+        let swapped: &[usize] = match kind {
+            PIXEL => &[2],
+            VOXEL => &[2, 6],
+            _ => &[],
+        };
+        swapped.iter().for_each(|&k| nodes.swap(k, k + 1));
+        raw.push((raw.count() as u64, group, grid.at), shape, &nodes);
         start = end as usize;
     }
     Ok(())
 }
 
+/// The shape to which VTK gives a number.
+fn shape(kind: u8) -> Option<RawShape> {
+    match kind {
+        PIXEL => Some(RawShape::Cell(CellShape::Quad4)),
+        VOXEL => Some(RawShape::Cell(CellShape::Hex8)),
+        13 => Some(RawShape::Other(OtherShape::Prism)),
+        14 => Some(RawShape::Other(OtherShape::Pyramid)),
+        _ => CellShape::of_vtk(kind).map(RawShape::Cell),
+    }
+}
+
 /// For each cell the number of its list of groups.
-fn group_numbers(raw: &mut RawMesh, data: &[(String, Vec<i64>)], shapes: &[CellShape]) -> Vec<u32> {
+fn group_numbers(raw: &mut RawMesh, data: &[(String, Vec<i64>)], shapes: &[RawShape]) -> Vec<u32> {
     let mut names: Vec<Vec<String>> = vec![Vec::new(); shapes.len()];
     let mut add = |name: &str, values: &[i64]| {
         if values.len() != shapes.len() {

@@ -91,7 +91,7 @@ fn unsupported_cells_and_bad_numbers_are_named() {
     };
     assert_eq!(message("small", "small").unwrap().cell_count(), 1);
     for (from, to, wanted) in [
-        ("1\n9\n", "1\n8\n", "element 0 is of type 8"),
+        ("1\n9\n", "1\n7\n", "element 0 is of type 7"),
         ("1\n9\n", "1\n5\n", "cell 0 (Tri3) with 4 nodes"),
         ("2 3\nCELL", "2 7\nCELL", "element 0 refers to node 7"),
         ("1 1 0", "1 1 2", "node 2 has z = 2"),

@@ -10,6 +10,7 @@ use std::io::{Error, ErrorKind, Read as _};
 use std::path::Path;
 
 use super::MeshError;
+use super::vtk_image::{Extent, Image};
 use super::vtu_data::{Blocks, Data, Storage, kind};
 use super::xml::{Event, Tag, Xml};
 use crate::mesh::raw::{Encoding, Source};
@@ -46,11 +47,15 @@ struct Piece<'a> {
     offsets: Option<Array<'a>>,
     types: Option<Array<'a>>,
     cell_data: Vec<Array<'a>>,
+    /// Of a piece of an image.
+    extent: Option<Extent>,
 }
 
 struct File<'a> {
     source: Source<'a>,
     storage: Storage,
+    /// Of an image.
+    image: Option<Image>,
     /// Bytes after the underscore of the appended data, and true if they are base64.
     appended: Option<(&'a [u8], bool)>,
 }
@@ -72,6 +77,7 @@ pub(super) fn parse<'a>(
             header: 4,
             is_compressed: false,
         },
+        image: None,
         appended: None,
     };
     let pieces = file.pieces()?;
@@ -200,7 +206,36 @@ impl<'a> File<'a> {
                     ..Piece::default()
                 });
             }
-            ([b"VTKFile", b"UnstructuredGrid", b"Piece", section], b"DataArray") => {
+            ([b"VTKFile"], b"ImageData") => {
+                let image = Image::of(|name| tag.attribute(name));
+                let wanted = "an image along the axes with a spacing above zero (Origin, Spacing, Direction)";
+                let image = image.ok_or_else(|| self.syntax(at, "another one", wanted))?;
+                self.image = Some(image);
+            }
+            ([b"VTKFile", b"ImageData"], b"Piece") => {
+                let text = tag.attribute("Extent").unwrap_or_default();
+                let extent = Extent::parse(&text);
+                let known = extent.and_then(|extent| Some((extent, extent.count()?)));
+                let (extent, cells) = known.ok_or_else(|| {
+                    let wanted = "six planes, first and last along x, y and z";
+                    self.syntax(at, &format!("Extent=\"{text}\""), wanted)
+                })?;
+                pieces.push(Piece {
+                    cells,
+                    at,
+                    extent: Some(extent),
+                    ..Piece::default()
+                });
+            }
+            (
+                [
+                    b"VTKFile",
+                    b"UnstructuredGrid" | b"ImageData",
+                    b"Piece",
+                    section,
+                ],
+                b"DataArray",
+            ) => {
                 let array = self.array(tag, at)?;
                 if let Some(piece) = pieces.last_mut() {
                     piece.take(section, array);
@@ -219,7 +254,7 @@ impl<'a> File<'a> {
             remedy,
         };
         match tag.attribute("type").as_deref() {
-            Some("UnstructuredGrid") => {}
+            Some("UnstructuredGrid" | "ImageData") => {}
             Some("PUnstructuredGrid") => {
                 return Err(unsupported(
                     "a grid spread over several files".into(),
@@ -228,7 +263,7 @@ impl<'a> File<'a> {
             }
             _ => {
                 return Err(unsupported(
-                    "a VTK data set other than an unstructured grid".into(),
+                    "a VTK data set other than an unstructured grid or an image".into(),
                     "convert it to an unstructured grid",
                 ));
             }
@@ -311,6 +346,17 @@ impl<'a> File<'a> {
         if piece.cells == 0 {
             return Ok(grid);
         }
+        if let (Some(extent), Some(image)) = (piece.extent, self.image) {
+            grid.points = extent.points();
+            // a size is believed once as many values have been read
+            self.add_cell_data(piece, &mut grid)?;
+            if grid.cell_data.is_empty() {
+                let found = "an image without integers per cell";
+                let wanted = "CellData with an integer array, such as the number of a phase (of values per point: the filter PointDataToCellData)";
+                return Err(self.syntax(piece.at, found, wanted));
+            }
+            return Ok(extent.grid(image, grid));
+        }
         let missing = wanted(&piece.coordinates, "Points")
             .or_else(|| wanted(&piece.connectivity, "connectivity"))
             .or_else(|| wanted(&piece.offsets, "offsets"))
@@ -353,6 +399,12 @@ impl<'a> File<'a> {
             grid.push_coordinate(n.real());
             Ok(())
         })?;
+        self.add_cell_data(piece, &mut grid)?;
+        Ok(grid)
+    }
+
+    /// Reads the integers per cell.
+    fn add_cell_data(&self, piece: &Piece<'_>, grid: &mut Grid) -> Result<(), MeshError> {
         for array in &piece.cell_data {
             if array.components == 1 && array.kind.is_some_and(Kind::is_integer) {
                 let mut values = Vec::new();
@@ -365,7 +417,7 @@ impl<'a> File<'a> {
                 grid.cell_data.push((array.name.clone(), values));
             }
         }
-        Ok(grid)
+        Ok(())
     }
 
     /// Hands on the `count` numbers of an array.

@@ -9,7 +9,9 @@ use super::bounds_checks;
 use super::error::{SceneError, closest};
 use super::region::{corners, position};
 use super::source::Span;
-use super::spec::{AxisSpec, CutoutSpec, FileMeshSpec, MeshSpec, PlaneCellSpec, SolidCellSpec};
+use super::spec::{
+    AxisSpec, CutoutSpec, FileMeshSpec, MergeSpec, MeshSpec, PlaneCellSpec, SolidCellSpec,
+};
 use super::value::{Coordinates, Text};
 use crate::fem;
 use crate::mesh::generate::{Axis, CutOut, Grid, SIDES};
@@ -26,10 +28,11 @@ fn from_file<const D: usize>(
     may_touch: bool,
 ) -> Result<Mesh<D>, SceneError> {
     let path = directory.join(&file.path.value);
-    let failed = |error: MeshError| {
+    let failed = |error: MeshError, numbers: String| {
         let told = SceneError::mesh(format!("`mesh.file.path`: {error}"))
             .label(file.path.span.clone(), "this mesh");
         match (&error, similar(&path)) {
+            _ if !numbers.is_empty() => told.help(numbers),
             (MeshError::Open { .. }, Some(name)) => told.help(format!(
                 "did you mean `{name}`? The path is relative to the scene file"
             )),
@@ -44,8 +47,18 @@ fn from_file<const D: usize>(
                 .help("the scene was given this mesh in memory")
         })?,
         None => {
-            let mesh = read::read_of(&path, file.order).map_err(failed)?;
-            quality::check_bodies(&mesh, may_touch).map_err(failed)?;
+            let unread = |error| failed(error, String::new());
+            let options = options(file);
+            let mut mesh = read::read_with(&path, &options).map_err(unread)?;
+            let keeps = file.merge == Some(MergeSpec::Keep);
+            quality::check_bodies(&mesh, may_touch, keeps).map_err(|error| {
+                let numbers = numbers_in_file::<D>(&path, &options, &error);
+                failed(error, numbers)
+            })?;
+            if !keeps {
+                let cracks = mesh.note_on_cracks();
+                mesh.notes.extend(cracks);
+            }
             mesh
         }
     };
@@ -56,6 +69,38 @@ fn from_file<const D: usize>(
             .help("straighten the sides of the cell, refine the mesh there, or set order = \"linear\"")
     })?;
     Ok(mesh)
+}
+
+/// How a file is read.
+fn options(file: &FileMeshSpec) -> read::Options {
+    read::Options {
+        order: file.order,
+        ignore: file.ignore.iter().map(|word| word.value.clone()).collect(),
+        merge: match file.merge {
+            Some(MergeSpec::Within(distance)) => Some(distance),
+            Some(MergeSpec::Keep) | None => None,
+        },
+    }
+}
+
+/// The numbers that the file gives to the cells and nodes of an error; empty of an error without any.
+fn numbers_in_file<const D: usize>(
+    path: &Path,
+    options: &read::Options,
+    error: &MeshError,
+) -> String {
+    let [cells, nodes] = error.numbers();
+    let Ok(numbers) = read::numbers_in_file::<D>(path, options, (&cells, &nodes)) else {
+        return String::new();
+    };
+    let told = [("element", &numbers[0]), ("node", &numbers[1])]
+        .into_iter()
+        .flat_map(|(what, tags)| tags.iter().map(move |tag| format!("{what} {tag}")));
+    let told: Vec<String> = told.collect();
+    match told.is_empty() {
+        true => String::new(),
+        false => format!("by the numbers of the file: {}", told.join(", ")),
+    }
 }
 
 /// The file beside a missing one whose name is most like its own.

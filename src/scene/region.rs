@@ -351,7 +351,12 @@ pub(crate) fn unknown_set<const D: usize>(
         .help(
             match super::error::closest(&name.value, known.iter().copied()) {
                 Some(near) => format!("did you mean `{near}`? {list}"),
-                None => list,
+                // what the reader left out may have been it
+                None => [list]
+                    .into_iter()
+                    .chain(mesh.notes.clone())
+                    .collect::<Vec<_>>()
+                    .join("; "),
             },
         )
 }

@@ -7,6 +7,7 @@ mod b;
 mod cantilever;
 mod e;
 mod f;
+mod files;
 mod fitted_weights;
 mod g_growth;
 mod h;

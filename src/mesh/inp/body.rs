@@ -27,6 +27,18 @@ pub(super) struct Element {
     pub at: usize,
 }
 
+impl Element {
+    /// One that is left out: sets may name it.
+    pub fn left_out(number: u64, at: usize) -> Self {
+        Self {
+            number,
+            kind: Kind::LEFT_OUT,
+            start: 0,
+            at,
+        }
+    }
+}
+
 /// Numbers `first, first + step, …, last` of nodes or elements.
 #[derive(Clone, Copy)]
 pub(super) struct Members {
@@ -137,7 +149,11 @@ pub(super) struct Body {
 impl Body {
     /// The nodes of an element by their numbers.
     pub fn nodes_of(&self, element: &Element) -> &[u64] {
-        &self.element_nodes[element.start..][..element.kind.shape.node_count()]
+        let count = match element.kind == Kind::LEFT_OUT {
+            true => 0,
+            false => element.kind.shape.node_count(),
+        };
+        &self.element_nodes[element.start..][..count]
     }
 
     /// Gives the body its number, so that sets elsewhere can hold its members.

@@ -4,22 +4,15 @@ use std::collections::HashMap;
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::Reader;
-use super::body::{Body, Members};
+use super::body::{self, Body, Element, Members};
+use super::kinds::Kind;
 use super::text::REWRITE;
-use crate::mesh::raw::{RawElement, RawMesh, RawNode};
+use super::{Reader, Scope};
+use crate::mesh::raw::{RawMesh, RawNode, RawShape};
 use crate::mesh::{CellShape, MeshError};
 
 /// Largest number of lines that a note lists for a keyword that is left out.
 const MOST_LINES: usize = 4;
-/// Keywords that give lines and surfaces a stiffness of their own.
-const SECTIONS: [&str; 4] = [
-    "SHELLSECTION",
-    "BEAMSECTION",
-    "MEMBRANESECTION",
-    "BEAMGENERALSECTION",
-];
-
 /// The mesh of all bodies.
 ///
 /// # Errors
@@ -34,6 +27,7 @@ pub(super) fn join(reader: &Reader) -> Result<RawMesh, MeshError> {
     };
     join.nodes();
     join.elements()?;
+    join.check_sections()?;
     join.node_sets()?;
     join.surfaces()?;
     join.tell();
@@ -113,8 +107,9 @@ impl Join<'_, '_> {
         let mut known: HashMap<Vec<u64>, u64> = HashMap::new();
         let names = self.element_set_names();
         for (b, body) in bodies.iter().enumerate() {
-            for (element, list) in body.elements.iter().zip(&lists[b]) {
-                let start = self.raw.element_nodes.len();
+            let own = body.elements.iter().zip(&lists[b]);
+            for (element, list) in own.filter(|(e, _)| e.kind != Kind::LEFT_OUT) {
+                let mut nodes = Vec::with_capacity(20);
                 for &node in body.nodes_of(element) {
                     if !body.node_places.contains_key(&node) {
                         return Err(MeshError::MissingNode {
@@ -124,16 +119,16 @@ impl Join<'_, '_> {
                             node,
                         });
                     }
-                    self.raw.element_nodes.push(self.offsets[b] + node);
+                    nodes.push(self.offsets[b] + node);
                 }
-                if element.kind.shape == CellShape::Line3 {
-                    let own = &mut self.raw.element_nodes[start..];
-                    if middle(body, body.nodes_of(element)) == 1 {
-                        own.swap(1, 2);
-                    }
+                let shape = element.kind.shape;
+                if shape == RawShape::Cell(CellShape::Line3)
+                    && middle(body, body.nodes_of(element)) == 1
+                {
+                    nodes.swap(1, 2);
                 }
-                if element.kind.shape.dimension() == self.dimension {
-                    let mut key = self.raw.element_nodes[start..].to_vec();
+                if shape.dimension() == self.dimension {
+                    let mut key = nodes.clone();
                     key.sort_unstable();
                     if let Some(first) = known.insert(key, element.number) {
                         return Err(MeshError::DuplicateElement {
@@ -153,13 +148,8 @@ impl Join<'_, '_> {
                         raw.groups.len() as u32 - 1
                     }),
                 };
-                raw.elements.push(RawElement {
-                    tag: self.offsets[b] + element.number,
-                    shape: element.kind.shape,
-                    start,
-                    group,
-                    at: element.at,
-                });
+                let tag = self.offsets[b] + element.number;
+                raw.push((tag, group, element.at), shape, &nodes);
             }
         }
         Ok(())
@@ -259,8 +249,9 @@ impl Join<'_, '_> {
                     let of = sides.members.body as usize;
                     let places =
                         self.found(&sides.members, &bodies[of].element_places, &name, "element")?;
-                    for place in places {
-                        let element = &bodies[of].elements[place as usize];
+                    let elements = &bodies[of].elements;
+                    let kept = places.iter().map(|&place| &elements[place as usize]);
+                    for element in kept.filter(|e| e.kind != Kind::LEFT_OUT) {
                         let shape = sides.face.nodes(element.kind).map(<[usize]>::len);
                         let shape = match (shape, self.dimension) {
                             (Some(1), 1) => CellShape::Vertex,
@@ -284,6 +275,81 @@ impl Join<'_, '_> {
         Ok(())
     }
 
+    /// Refuses elements of a lower dimension than the body's to which a section gives a stiffness: a model has none for them.
+    fn check_sections(&self) -> Result<(), MeshError> {
+        for &(scope, set, at) in &self.reader.sections {
+            // a part has its instances
+            let bodies = self.reader.bodies.iter();
+            let members = match scope {
+                Scope::Model => self.reader.bodies[0].element_sets.get(set),
+                Scope::Part(part) => self.reader.parts[part].element_sets.get(set),
+                Scope::Instance(i) => self.reader.bodies[i].element_sets.get(set),
+            };
+            let elements = match scope {
+                Scope::Part(part) => &self.reader.parts[part],
+                Scope::Instance(i) => &self.reader.bodies[i],
+                Scope::Model => &self.reader.bodies[0],
+            };
+            let found = members.into_iter().flatten().flat_map(|members| {
+                let body = match members.body {
+                    body::THIS => elements,
+                    body => bodies.clone().nth(body as usize).unwrap_or(elements),
+                };
+                let (places, _) = members.find(&body.element_places);
+                places
+                    .into_iter()
+                    .map(|place| body.elements[place as usize])
+            });
+            let lower: Vec<Element> = found
+                .filter(|e| (1..self.dimension).contains(&e.kind.shape.dimension()))
+                .collect();
+            if let Some(first) = lower.first() {
+                return Err(MeshError::Unsupported {
+                    path: self.reader.source.file(at),
+                    place: self.reader.source.place(at),
+                    what: format!(
+                        "the stiffness of {} elements of type {} in the set {set} (the first: {}), beside a body of dimension {},",
+                        lower.len(),
+                        first.kind.stem,
+                        first.number,
+                        self.dimension
+                    ),
+                    remedy: "take them and their section out of the deck, or leave them out, with what they stiffen, by mesh.file.ignore = [\"…\"] with their type",
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes elements that are left out, and bars that have no stiffness.
+    fn tell_elements(&mut self) {
+        let bodies = self.reader.bodies.iter();
+        let all: Vec<&Element> = bodies.flat_map(|body| &body.elements).collect();
+        let path = self.reader.source.path.display();
+        let unwanted = self.reader.unwanted.iter();
+        let unwanted = unwanted.filter(|(_, count)| *count > 0);
+        self.raw.left_out = unwanted.clone().map(|(word, _)| word.clone()).collect();
+        let counts: Vec<String> = unwanted
+            .map(|(word, count)| format!("{count} elements of type {word}"))
+            .collect();
+        if !counts.is_empty() {
+            self.raw.notes.push(format!(
+                "{path}: {} are left out, and what they stiffen is missing (mesh.file.ignore)",
+                counts.join(", ")
+            ));
+        }
+        let bars = all.iter().filter(|e| e.kind.is_bar() && self.dimension > 1);
+        let bars: Vec<_> = bars.collect();
+        if let Some(first) = bars.first() {
+            self.raw.notes.push(format!(
+                "{path}: {} elements of type {} (the first: {}) have no stiffness here: bars and beams name edges and nodes of a body alone",
+                bars.len(),
+                first.kind.stem,
+                first.number
+            ));
+        }
+    }
+
     fn no_face(&self, surface: &str, element: u64, at: usize) -> MeshError {
         let dimension = self.dimension;
         self.reader.source.syntax(
@@ -303,15 +369,8 @@ impl Join<'_, '_> {
     }
 
     fn push(&mut self, shape: CellShape, nodes: &[u64], tag: u64, group: u32, at: usize) {
-        let start = self.raw.element_nodes.len();
-        self.raw.element_nodes.extend_from_slice(nodes);
-        self.raw.elements.push(RawElement {
-            tag,
-            shape,
-            start,
-            group,
-            at,
-        });
+        self.raw
+            .push((tag, group, at), RawShape::Cell(shape), nodes);
     }
 
     /// Adds notes on the parts of the deck that are left out.
@@ -337,22 +396,7 @@ impl Join<'_, '_> {
                 told.join(", ")
             ));
         }
-        let lower = |e: &&RawElement| {
-            let dimension = e.shape.dimension();
-            dimension > 0 && dimension < self.dimension
-        };
-        let count = self
-            .reader
-            .bodies
-            .iter()
-            .map(|body| body.elements.len())
-            .sum();
-        let count = self.raw.elements.iter().take(count).filter(lower).count();
-        if count > 0 && SECTIONS.iter().any(|word| ignored.contains_key(*word)) {
-            self.raw.notes.push(format!(
-                "{path}: {count} elements have a dimension below that of the body: they name facets and nodes, and carry nothing"
-            ));
-        }
+        self.tell_elements();
         if let Some(at) = self.reader.axisymmetric.filter(|_| self.dimension == 2) {
             self.raw.notes.push(format!(
                 "{}: {}: axisymmetric elements are read as plane ones; there is no axisymmetric model",

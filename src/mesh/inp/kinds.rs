@@ -3,13 +3,30 @@
 //! Sources: Abaqus Analysis User's Guide, "Element library"; CalculiX CrunchiX user's manual, chapters "Element types" and "*SURFACE".
 
 use crate::mesh::CellShape;
+use crate::mesh::raw::{OtherShape, RawShape};
 
 /// A type of elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Kind {
-    pub shape: CellShape,
+    /// Its name without the letters of variants.
+    pub stem: &'static str,
+    pub shape: RawShape,
     /// True if its faces are counted as those of a shell: both sides first, then edges.
     pub shell: bool,
+}
+
+impl Kind {
+    /// Of elements that are left out.
+    pub const LEFT_OUT: Self = Self {
+        stem: "",
+        shape: RawShape::Cell(CellShape::Vertex),
+        shell: false,
+    };
+
+    /// Returns true for bars and beams in the plane; those in space are what Gmsh and meshio write for the edges of a body.
+    pub fn is_bar(self) -> bool {
+        ["T2D2", "T2D3", "B21", "B22", "B23"].contains(&self.stem)
+    }
 }
 
 /// A face of an element by its label in a surface.
@@ -53,25 +70,49 @@ impl Face {
             &[3, 7, 4, 0],
         ];
         const TET: [&[usize]; 4] = [&[0, 1, 2], &[0, 3, 1], &[1, 3, 2], &[2, 3, 0]];
+        const PRISM: [&[usize]; 5] = [
+            &[0, 1, 2],
+            &[3, 5, 4],
+            &[0, 3, 4, 1],
+            &[1, 4, 5, 2],
+            &[2, 5, 3, 0],
+        ];
+        const PYRAMID: [&[usize]; 5] = [
+            &[0, 1, 2, 3],
+            &[0, 4, 1],
+            &[1, 4, 2],
+            &[2, 4, 3],
+            &[3, 4, 0],
+        ];
         const ENDS: [&[usize]; 2] = [&[0], &[1]];
         const ALL: &[usize] = &[0, 1, 2, 3, 4, 5, 6, 7];
-        let plane = kind.shape.dimension() == 2;
+        let shape = match (kind.shape, self) {
+            (RawShape::Cell(shape), _) => shape,
+            (RawShape::Other(OtherShape::Prism), Self::Side(n)) => {
+                return PRISM.get(n - 1).copied();
+            }
+            (RawShape::Other(OtherShape::Pyramid), Self::Side(n)) => {
+                return PYRAMID.get(n - 1).copied();
+            }
+            (RawShape::Other(_), _) => return None,
+        };
+        let plane = shape.dimension() == 2;
         // of a solid of second order the facet with the corners of that face
         let full = |corners: &[usize]| {
             let has_all = |f: &&&[usize]| corners.iter().all(|i| f.contains(i));
-            kind.shape.facets().iter().find(has_all).copied()
+            shape.facets().iter().find(has_all).copied()
         };
-        match (kind.shape, self) {
+        match (shape, self) {
             (CellShape::Hex20, Self::Side(n)) => full(HEX.get(n - 1)?),
             (CellShape::Tet10, Self::Side(n)) => full(TET.get(n - 1)?),
             (CellShape::Hex8, Self::Side(n)) => HEX.get(n - 1).copied(),
             (CellShape::Tet4, Self::Side(n)) => TET.get(n - 1).copied(),
             (CellShape::Line2 | CellShape::Line3, Self::End(n)) => ENDS.get(n - 1).copied(),
-            (_, Self::Edge(n)) if plane => kind.shape.facets().get(n - 1).copied(),
-            (_, Self::Whole) if plane => ALL.get(..kind.shape.node_count()),
-            (_, Self::Side(1 | 2)) if plane && kind.shell => ALL.get(..kind.shape.node_count()),
-            (_, Self::Side(n)) if plane && kind.shell => kind.shape.facets().get(n - 3).copied(),
-            (_, Self::Side(n)) if plane => kind.shape.facets().get(n - 1).copied(),
+            (_, Self::Edge(n)) if plane => shape.facets().get(n - 1).copied(),
+            (_, Self::Whole) if plane => ALL.get(..shape.node_count()),
+            (_, Self::Side(1 | 2)) if plane && kind.shell => ALL.get(..shape.node_count()),
+            (_, Self::Side(n)) if plane && kind.shell => shape.facets().get(n - 3).copied(),
+            (_, Self::Side(n)) if plane => shape.facets().get(n - 1).copied(),
             _ => None,
         }
     }
@@ -141,14 +182,27 @@ const SECOND_ORDER: [(&str, &str); 3] = [
 pub(super) fn kind(word: &str) -> Result<Kind, (&'static str, &'static str)> {
     const ORDER: &str =
         "mesh again with elements of first order, or convert the mesh (in Gmsh: SetOrder 1)";
-    const SHAPE: &str = "supported are lines, triangles, quadrilaterals, tetrahedra and hexahedra of first and second order: mesh without it";
+    const SHAPE: &str = "supported are lines, triangles, quadrilaterals, tetrahedra and hexahedra of first and second order, prisms and pyramids of first: mesh without it, or leave it out, with what it stiffens, by mesh.file.ignore";
     let stem = |stem: &str| {
         let rest = word.strip_prefix(stem)?;
         VARIANTS.contains(&rest).then_some(())
     };
     for (name, shape, shell) in STEMS {
         if stem(name).is_some() {
-            return Ok(Kind { shape, shell });
+            return Ok(Kind {
+                stem: name,
+                shape: RawShape::Cell(shape),
+                shell,
+            });
+        }
+    }
+    for (name, shape) in [("C3D6", OtherShape::Prism), ("C3D5", OtherShape::Pyramid)] {
+        if stem(name).is_some() {
+            return Ok(Kind {
+                stem: name,
+                shape: RawShape::Other(shape),
+                shell: false,
+            });
         }
     }
     for (name, told) in SECOND_ORDER {
@@ -156,9 +210,5 @@ pub(super) fn kind(word: &str) -> Result<Kind, (&'static str, &'static str)> {
             return Err((told, ORDER));
         }
     }
-    Err(match word {
-        _ if word.starts_with("C3D6") => ("prism", SHAPE),
-        _ if word.starts_with("C3D5") => ("pyramid", SHAPE),
-        _ => ("no continuum element that is known here", SHAPE),
-    })
+    Err(("no continuum element that is known here", SHAPE))
 }

@@ -57,10 +57,15 @@ const REFUSED: [&str; 14] = [
 const SILENT: [&str; 4] = ["HEADING", "PREPRINT", "INCLUDE", "ENDSTEP"];
 
 /// Parses a deck whose included files are in `bytes`.
+///
+/// Elements of the types `ignore` are left out.
+///
+/// # Errors
+/// See [`MeshError`].
 pub(super) fn parse<'a>(
     path: &Path,
-    bytes: &'a [u8],
-    pieces: &'a [Piece],
+    (bytes, pieces): (&'a [u8], &'a [Piece]),
+    ignore: &[String],
 ) -> Result<(RawMesh, Source<'a>), MeshError> {
     let mut reader = Reader {
         source: Source {
@@ -75,6 +80,11 @@ pub(super) fn parse<'a>(
         bodies: vec![Body::default()],
         ignored: BTreeMap::new(),
         axisymmetric: None,
+        waiting: Vec::new(),
+        sections: Vec::new(),
+        unwanted: (ignore.iter())
+            .map(|word| (word.to_ascii_uppercase(), 0))
+            .collect(),
     };
     reader.deck()?;
     let raw = join::join(&reader)?;
@@ -100,6 +110,20 @@ struct Reader<'a> {
     ignored: BTreeMap<String, Vec<usize>>,
     /// Position of the first axisymmetric elements.
     axisymmetric: Option<usize>,
+    /// Sets and surfaces that name what stands below them.
+    waiting: Vec<Waiting>,
+    /// Sets that a section gives a stiffness, with the keyword and the byte where it stands.
+    sections: Vec<(Scope, &'a str, usize)>,
+    /// Types of elements that are left out, in capitals, and how many there are.
+    unwanted: Vec<(String, usize)>,
+}
+
+/// A set or a surface that could not be read yet.
+struct Waiting {
+    scope: Scope,
+    /// Byte where it stands.
+    at: usize,
+    error: MeshError,
 }
 
 impl<'a> Reader<'a> {
@@ -113,7 +137,8 @@ impl<'a> Reader<'a> {
             self.card(&card)?;
             self.skip_data();
         }
-        self.end_scope();
+        self.end_scope()?;
+        self.read_waiting()?;
         match (self.parts.first(), self.bodies.len()) {
             (Some(part), 1) => Err(MeshError::Unsupported {
                 path: self.source.path.clone(),
@@ -132,13 +157,20 @@ impl<'a> Reader<'a> {
         match card.keyword.as_str() {
             "NODE" => self.nodes(card),
             "ELEMENT" => self.elements(card),
-            "NSET" | "ELSET" => self.set(card),
-            "SURFACE" => self.surface(card),
+            "NSET" | "ELSET" | "SURFACE" => {
+                if let Err(error) = self.set_or_surface(card) {
+                    self.waiting.push(Waiting {
+                        scope: self.scope,
+                        at: card.at,
+                        error,
+                    });
+                }
+                Ok(())
+            }
             "PART" => self.part(card),
             "INSTANCE" => self.instance(card),
             "ASSEMBLY" | "ENDASSEMBLY" | "ENDPART" | "ENDINSTANCE" => {
-                self.end_scope();
-                Ok(())
+                self.end_scope()
             }
             word if SILENT.contains(&word) => Ok(()),
             word if REFUSED.contains(&word) => Err(self.unsupported(
@@ -147,6 +179,9 @@ impl<'a> Reader<'a> {
                 "it changes nodes or elements: write the deck with all of them, as a preprocessor does",
             )),
             word => {
+                if let Some(set) = card.get("ELSET").filter(|_| word.ends_with("SECTION")) {
+                    self.sections.push((self.scope, set, card.at));
+                }
                 self.ignore(word.into(), card.at);
                 Ok(())
             }
@@ -175,7 +210,7 @@ impl<'a> Reader<'a> {
     }
 
     fn instance(&mut self, card: &Card) -> Result<(), MeshError> {
-        self.end_scope();
+        self.end_scope()?;
         if card.get("LIBRARY").is_some() {
             return Err(self.unsupported(
                 card.at,
@@ -230,11 +265,15 @@ impl<'a> Reader<'a> {
     }
 
     /// Ends a part or an instance.
-    fn end_scope(&mut self) {
+    fn end_scope(&mut self) -> Result<(), MeshError> {
+        if self.scope != Scope::Model {
+            self.read_waiting()?;
+        }
         if let Scope::Instance(i) = self.scope {
             self.bodies[i].number(i as u32);
         }
         self.scope = Scope::Model;
+        Ok(())
     }
 
     fn find_instance(&self, name: &str) -> Option<usize> {
@@ -321,6 +360,14 @@ impl<'a> Reader<'a> {
             let Some(&number) = numbers.first() else {
                 return Err(self.syntax(at, line, "the number of an element"));
             };
+            if let Some(unwanted) = self.unwanted.iter_mut().find(|(own, _)| *own == word) {
+                unwanted.1 += 1;
+                self.skip_element(line)?;
+                let element = Element::left_out(number, at);
+                self.element(element, &[])?;
+                self.add_to_set(set, one(body, number, at));
+                continue;
+            }
             let kind = kind(&word).map_err(|(name, remedy)| MeshError::UnsupportedElement {
                 path: self.source.file(at),
                 place: self.source.place(at),
@@ -355,14 +402,24 @@ impl<'a> Reader<'a> {
                 },
                 &numbers[1..],
             )?;
-            if let Some(set) = set {
-                self.body()
-                    .element_sets
-                    .entry(set)
-                    .push(one(body, number, at));
-            }
+            self.add_to_set(set, one(body, number, at));
         }
         Ok(())
+    }
+
+    /// Passes over the other lines of an element, of any number of nodes.
+    fn skip_element(&mut self, first: &str) -> Result<(), MeshError> {
+        let mut goes_on = first.ends_with(',');
+        while goes_on {
+            goes_on = (self.data()?).is_some_and(|(_, line)| line.ends_with(','));
+        }
+        Ok(())
+    }
+
+    fn add_to_set(&mut self, set: Option<&str>, member: Members) {
+        if let Some(set) = set {
+            self.body().element_sets.entry(set).push(member);
+        }
     }
 
     fn element(&mut self, mut element: Element, nodes: &[u64]) -> Result<(), MeshError> {

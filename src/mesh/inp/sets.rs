@@ -1,9 +1,9 @@
 //! The keywords of sets and surfaces.
 
-use super::body::{Members, Sets, Sides};
+use super::body::{Members, Sets, Sides, key};
 use super::kinds::Face;
 use super::text::Card;
-use super::{Reader, fields, one};
+use super::{Reader, Waiting, fields, one};
 use crate::mesh::MeshError;
 
 /// Kind of a set's members.
@@ -14,8 +14,78 @@ enum Of {
 }
 
 impl<'a> Reader<'a> {
-    /// `*NSET` and `*ELSET`: numbers, ranges, and names of sets that stand above.
-    pub(super) fn set(&mut self, card: &Card<'a>) -> Result<(), MeshError> {
+    /// `*NSET`, `*ELSET` or `*SURFACE`, as far as what it names stands above.
+    ///
+    /// # Errors
+    /// [`MeshError`], among them that of a name that may stand below; nothing is read then.
+    pub(super) fn set_or_surface(&mut self, card: &Card<'a>) -> Result<(), MeshError> {
+        match card.keyword.as_str() {
+            "SURFACE" => self.surface(card),
+            _ => self.set(card),
+        }
+    }
+
+    /// Reads the sets and surfaces of the scope at hand that waited for what stands below them.
+    ///
+    /// # Errors
+    /// That of the first one that names what stands nowhere.
+    pub(super) fn read_waiting(&mut self) -> Result<(), MeshError> {
+        let at = self.at;
+        loop {
+            let scope = self.scope;
+            let (own, others): (Vec<_>, Vec<_>) = std::mem::take(&mut self.waiting)
+                .into_iter()
+                .partition(|waiting| waiting.scope == scope);
+            self.waiting = others;
+            let count = own.len();
+            let mut left = Vec::new();
+            // what is named stands below: the last ones first
+            for mut waiting in own.into_iter().rev() {
+                let card = Card::read(&self.source, waiting.at)?;
+                self.at = card.next;
+                if let Err(error) = self.set_or_surface(&card) {
+                    waiting.error = error;
+                    left.push(waiting);
+                }
+            }
+            left.reverse();
+            if left.len() == count {
+                self.at = at;
+                return self.unread(left);
+            }
+            self.waiting.extend(left);
+        }
+    }
+
+    /// Fails for sets that were not read, if there are any: for the first that names what stands nowhere, else for one in a circle.
+    fn unread(&self, left: Vec<Waiting>) -> Result<(), MeshError> {
+        let Some(first) = left.first().map(|waiting| waiting.at) else {
+            return Ok(());
+        };
+        let mut names = Vec::new();
+        for waiting in &left {
+            let card = Card::read(&self.source, waiting.at)?;
+            let name = ["NSET", "ELSET", "NAME"]
+                .into_iter()
+                .find_map(|key| card.get(key));
+            names.extend(name.map(|name| format!("\"{}\"", key(name))));
+        }
+        let is_known = |error: &MeshError| match error {
+            MeshError::Syntax { found, .. } => names.contains(&found.to_ascii_uppercase()),
+            _ => false,
+        };
+        match left.into_iter().find(|waiting| !is_known(&waiting.error)) {
+            Some(waiting) => Err(waiting.error),
+            None => Err(self.syntax(
+                first,
+                "a set that names itself, or sets that name each other in a circle",
+                "sets that end in numbers",
+            )),
+        }
+    }
+
+    /// `*NSET` and `*ELSET`: numbers, ranges, and names of sets.
+    fn set(&mut self, card: &Card<'a>) -> Result<(), MeshError> {
         let of = match card.keyword.as_str() {
             "NSET" => Of::Nodes,
             _ => Of::Elements,
@@ -124,7 +194,7 @@ impl<'a> Reader<'a> {
                 return Ok(members);
             }
         }
-        Err(self.syntax(at, word, "a number, or the name of a set above"))
+        Err(self.syntax(at, word, "a number, or the name of a set of the deck"))
     }
 
     /// The nodes of elements, which have to stand above.
@@ -151,7 +221,7 @@ impl<'a> Reader<'a> {
     }
 
     /// `*SURFACE` of elements or nodes.
-    pub(super) fn surface(&mut self, card: &Card<'a>) -> Result<(), MeshError> {
+    fn surface(&mut self, card: &Card<'a>) -> Result<(), MeshError> {
         let kind = card.get("TYPE").unwrap_or("ELEMENT").to_ascii_uppercase();
         if !["ELEMENT", "NODE"].contains(&kind.as_str()) {
             self.ignore(format!("SURFACE, TYPE={kind}"), card.at);
@@ -168,6 +238,7 @@ impl<'a> Reader<'a> {
         }
         let name = card.required("NAME", &self.source)?;
         let body = self.body_named(card)?;
+        let mut all = Vec::new();
         while let Some((at, line)) = self.data()? {
             let mut words = fields(line);
             let whose = words.next().unwrap_or("");
@@ -194,7 +265,10 @@ impl<'a> Reader<'a> {
                 members: Members { at, ..members },
                 face,
             });
-            self.body().surfaces.entry(name).extend(sides);
+            all.extend(sides);
+        }
+        if kind == "ELEMENT" {
+            self.body().surfaces.entry(name).extend(all);
         }
         Ok(())
     }

@@ -512,7 +512,7 @@ fn refusals_name_file_line_and_number() {
             "*ELEMENT, TYPE=SPRINGA\n31,1,2\n",
             &["line 17", "element 31", "SPRINGA"],
         ),
-        ("*ELEMENT, TYPE=C3D6\n31,1,2\n", &["prism"]),
+        ("*ELEMENT, TYPE=C3D6\n31,1,2\n", &["C3D6 with 2 nodes", "6"]),
         ("*ELEMENT\n31,1,2\n", &["line 16", "TYPE"]),
         (
             "*ELEMENT, TYPE=CPS3\n31,1,2,13,12\n",

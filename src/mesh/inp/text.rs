@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::mesh::MeshError;
-use crate::mesh::raw::{Encoding, Piece, Source};
-use crate::regular_file;
+use crate::mesh::raw::{Encoding, Piece, Source, bytes_of};
 
 /// Remedy for a wrong line.
 pub(super) const REWRITE: &str = "correct the deck, or write it again";
@@ -145,10 +144,7 @@ struct Whole {
 
 impl Whole {
     fn add(&mut self, path: &Path) -> Result<(), MeshError> {
-        let bytes = regular_file::read(path).map_err(|source| MeshError::Open {
-            path: path.into(),
-            source,
-        })?;
+        let bytes = bytes_of(path)?;
         let source = Source {
             path: path.into(),
             bytes: &bytes,

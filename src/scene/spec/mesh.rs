@@ -1,10 +1,13 @@
 //! The mesh of a scene.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::fmt;
 use std::sync::Arc;
 
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
+use serde::de::{self, Deserializer, Unexpected, Visitor};
 use toml::Spanned;
 
 use crate::mesh::{MeshParts, Order};
@@ -98,9 +101,66 @@ pub struct FileMeshSpec {
     /// Treatment of cells of second order; "kept" if left out.
     #[serde(default)]
     pub order: Order,
+    /// Sets of cells that are left out, and types of elements of a deck (`.inp`), such as `"T2D2"`.
+    #[serde(default)]
+    pub ignore: Vec<Text>,
+    /// Nodes at one place: false keeps them apart, a distance makes those within it one. If left out, those along a crack stay apart, and others are refused.
+    #[serde(default)]
+    pub merge: Option<MergeSpec>,
     /// A mesh in memory that stands for the file; the source of the scene has it.
     #[serde(skip)]
     pub held: Option<Arc<MeshParts>>,
+}
+
+/// Treatment of nodes of a file at one place: false, or a distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MergeSpec {
+    /// All stay.
+    Keep,
+    /// Those within this distance are one \[length\].
+    Within(f64),
+}
+
+impl<'de> Deserialize<'de> for MergeSpec {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Choices;
+        impl Visitor<'_> for Choices {
+            type Value = MergeSpec;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("false, or a distance above zero")
+            }
+
+            fn visit_bool<E: de::Error>(self, v: bool) -> Result<MergeSpec, E> {
+                match v {
+                    false => Ok(MergeSpec::Keep),
+                    true => Err(E::invalid_value(Unexpected::Bool(v), &self)),
+                }
+            }
+
+            fn visit_i64<E: de::Error>(self, v: i64) -> Result<MergeSpec, E> {
+                self.visit_f64(v as f64)
+            }
+
+            fn visit_f64<E: de::Error>(self, v: f64) -> Result<MergeSpec, E> {
+                match v > 0.0 && v.is_finite() {
+                    true => Ok(MergeSpec::Within(v)),
+                    false => Err(E::invalid_value(Unexpected::Float(v), &self)),
+                }
+            }
+        }
+        deserializer.deserialize_any(Choices)
+    }
+}
+
+impl JsonSchema for MergeSpec {
+    fn schema_name() -> Cow<'static, str> {
+        "MergeSpec".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "anyOf": [{ "const": false }, { "type": "number", "exclusiveMinimum": 0 }] })
+    }
 }
 
 /// A box that a generated mesh leaves out.

@@ -40,7 +40,7 @@ pub use influence::{InfluenceSpec, MicromodulusSpec, PolynomialSpec};
 pub use material::{LatticeSpec, MaterialSpec, PeridynamicsSpec, PointsSpec};
 pub use material_interface::MaterialInterfaceSpec;
 pub use mesh::{
-    AxisSpec, BoxMeshSpec, CutoutSpec, FileMeshSpec, GradedSpec, LineMeshSpec, MeshSpec,
+    AxisSpec, BoxMeshSpec, CutoutSpec, FileMeshSpec, GradedSpec, LineMeshSpec, MergeSpec, MeshSpec,
     PlaneCellSpec, RectangleMeshSpec, SolidCellSpec,
 };
 pub use motion::{
