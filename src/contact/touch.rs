@@ -58,14 +58,9 @@ fn nearest<const D: usize>(
     let mut found: Option<(f64, u32, [f64; D], Vector<D>)> = None;
     // the normals of facets that meet where the place is nearest
     let mut normals = Vector::zeros();
-    // distance to the near side of another body, of a place before it
-    let mut before = f64::INFINITY;
     for &facet in facets {
         let normal = surface.normal(facet, corners);
-        let is_turned_away = outward.is_some_and(|own| own.dot(&normal) > FACING);
-        let may_be_beyond =
-            surface.deepest > 1.0 && own.body != surface.facets[facet as usize].body;
-        if is_turned_away && !may_be_beyond {
+        if outward.is_some_and(|own| own.dot(&normal) > FACING) {
             continue;
         }
         let at = surface.corners_of(facet, corners);
@@ -73,12 +68,6 @@ fn nearest<const D: usize>(
         let nearest: Vector<D> = at.iter().zip(weights).map(|(c, w)| c * w).sum();
         let way = x - nearest;
         let distance = way.norm();
-        if is_turned_away {
-            if way.dot(&normal) > 0.0 {
-                before = before.min(distance);
-            }
-            continue;
-        }
         match &found {
             Some((least, ..)) if distance > least + tie => continue,
             Some((least, ..)) if distance >= least - tie => {
@@ -93,10 +82,6 @@ fn nearest<const D: usize>(
     let side = way.dot(&normals);
     let is_beside = -side < BENEATH * distance * normals.norm();
     if side < 0.0 && weights.contains(&0.0) && is_beside {
-        return None;
-    }
-    // the far side of a thin body is behind a place that lies before its near side
-    if side < 0.0 && before < distance {
         return None;
     }
     let out = match distance > tie {

@@ -146,12 +146,13 @@ fn decks_of_other_programs() {
         } else if extension == Some("json") {
             let model = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
             let deck = path.with_extension("inp");
-            match detect_dimension(&deck).unwrap_or_else(|e| panic!("{e}")) {
-                1 => as_meshio::<1>(&deck, &model),
-                2 => as_meshio::<2>(&deck, &model),
-                _ => as_meshio::<3>(&deck, &model),
+            match detect_dimension(&deck) {
+                Ok(1) => as_meshio::<1>(&deck, &model),
+                Ok(2) => as_meshio::<2>(&deck, &model),
+                Ok(_) => as_meshio::<3>(&deck, &model),
+                // beams and shells beside solids
+                Err(e) => assert!(e.to_string().contains("the stiffness of"), "{e}"),
             }
-            println!("{stem}: as meshio");
             counts[1] += 1;
         }
     }
@@ -206,9 +207,16 @@ fn as_meshio<const D: usize>(deck: &Path, model: &Value) {
         }
     }
     assert_eq!(mesh.cell_count(), body.len());
+    let mut notes = mesh.notes.iter();
+    let is_turned = notes.any(|note| note.contains("the wrong way round"));
     for (c, nodes) in body.iter().enumerate() {
-        let nodes: Vec<u32> = nodes.iter().map(|n| new[n]).collect();
-        assert_eq!(mesh.cell(c), nodes, "{}: cell {c}", deck.display());
+        let (mut own, mut nodes) = (mesh.cell(c).to_vec(), nodes.to_vec());
+        nodes.iter_mut().for_each(|n| *n = new[n]);
+        if is_turned {
+            own.sort_unstable();
+            nodes.sort_unstable();
+        }
+        assert_eq!(own, nodes, "{}: cell {c}", deck.display());
     }
     let find = |names: Vec<&String>, name: &str| -> Option<String> {
         let mut names = names.into_iter();
