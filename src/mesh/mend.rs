@@ -59,6 +59,10 @@ fn merge(raw: &mut RawMesh, distance: f64) {
             }
         }
     }
+    // a chain of nodes, each within the distance of the next, is one: the first of each comes before it
+    for i in 0..first.len() {
+        first[i] = first[first[i]];
+    }
     let tags: HashMap<u64, u64> = (first.iter().enumerate())
         .filter(|(i, of)| i != *of)
         .map(|(i, &of)| (raw.nodes[i].tag, raw.nodes[of].tag))

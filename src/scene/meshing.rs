@@ -71,7 +71,7 @@ fn from_file<const D: usize>(
     Ok(mesh)
 }
 
-/// How a file is read.
+/// The options of a reader, by the keys of `mesh.file`.
 fn options(file: &FileMeshSpec) -> read::Options {
     read::Options {
         order: file.order,
