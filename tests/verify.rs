@@ -6,7 +6,7 @@ use bondline::{
 };
 use bondline_verify::{
     Effort, balance, extremes, large_deformation, layers, partial_volumes, plasticity, quadratic,
-    surface_layer, tangents, weights,
+    surface_layer, tangents, weights, zones,
 };
 
 fn assert_no_short(tables: &[Table]) {
@@ -91,6 +91,15 @@ fn large_deformations_pass_every_seam_that_takes_their_law() {
     let passed = tables.iter().flat_map(|table| &table.rows);
     let passed = passed.filter(|r| r.case.contains("neo-Hooke") && r.verdict == Verdict::Pass);
     assert_eq!(passed.count(), 2 * (3 * 4 + 1));
+}
+
+/// Steps, loads and affine fields; where little is left of elements at a surface, masses used to shorten the steps to a fifth.
+#[test]
+fn zones_that_are_drawn_hold_what_they_should() {
+    let tables = zones::run(Effort::Quick, &Silent);
+    assert_no_short(&tables);
+    assert_eq!(count(&tables, "rims two spacings wide", Verdict::Pass), 4);
+    assert_eq!(count(&tables, "loads and masses", Verdict::Pass), 12);
 }
 
 #[test]

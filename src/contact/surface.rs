@@ -1,8 +1,9 @@
 //! Surfaces that may touch: facets, and the places that are kept out of them.
 
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::assembly::Transfer;
+use crate::parallel;
 use crate::tensor::Vector;
 
 /// Cosine between the outward normals of two surfaces above which they do not press on each other.
@@ -62,6 +63,8 @@ pub(super) struct Surface<const D: usize> {
     around: (Vec<u32>, Vec<u32>),
     /// In 1D, where corners have no order: the outward direction of each facet.
     pub outward: Vec<f64>,
+    /// Extent at rest of the body of each facet along its normal \[m\].
+    thickness: Vec<f64>,
     /// The first facet on a crack.
     pub cracks_from: u32,
     /// Depth up to which places are pushed out of another body and of the faces of cracks, which have none behind them, over the size of cells.
@@ -97,11 +100,12 @@ impl<const D: usize> Surface<D> {
                 next[c as usize] += 1;
             }
         }
-        Self {
+        let mut surface = Self {
             corners: corners.0,
             corner_rows: corners.1,
             facets,
             outward,
+            thickness: Vec::new(),
             places: places.0,
             rest: places.1,
             place_rows: places.2,
@@ -109,16 +113,49 @@ impl<const D: usize> Surface<D> {
             cracks_from,
             deepest,
             horizon,
+        };
+        surface.thickness = surface.thickness_of_bodies();
+        surface
+    }
+
+    /// The extent of the body of each facet along its normal, by those of its corners that come first in a number of directions.
+    fn thickness_of_bodies(&self) -> Vec<f64> {
+        let each = (0..5_usize.pow(D as u32))
+            .map(|k| Vector::<D>::from_fn(|a, _| (k / 5_usize.pow(a as u32) % 5) as f64 - 2.0));
+        let directions: Vec<Vector<D>> = each.collect();
+        let mut first: FxHashMap<u32, Vec<Vector<D>>> = FxHashMap::default();
+        for facet in &self.facets {
+            for x in facet.corners.map(|c| self.corners[c as usize]) {
+                let own = first
+                    .entry(facet.body)
+                    .or_insert_with(|| vec![x; directions.len()]);
+                for (first, direction) in own.iter_mut().zip(&directions) {
+                    if x.dot(direction) > first.dot(direction) {
+                        *first = x;
+                    }
+                }
+            }
         }
+        parallel::map(self.facets.len(), 64, |f| {
+            let normal = self.normal(f as u32, &self.corners);
+            let along = first[&self.facets[f].body].iter().map(|x| x.dot(&normal));
+            let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+                (low.min(x), high.max(x))
+            });
+            high - low
+        })
     }
 
     /// Depth inside a facet up to which a place is pushed out of it \[m\].
-    pub fn reach_in(&self, place: &Place, facet: &Facet<D>) -> f64 {
+    pub fn reach_in(&self, place: &Place, facet: u32) -> f64 {
         let is_of_crack = place.facet != NONE && place.facet >= self.cracks_from;
-        let size = place.size.min(facet.size);
-        match is_of_crack || place.body != facet.body {
-            true => self.deepest * size,
-            false => DEEPEST * size,
+        let other = &self.facets[facet as usize];
+        let size = place.size.min(other.size);
+        match (is_of_crack, place.body != other.body) {
+            // what lies deeper than the body is thick lies before its other side
+            (_, true) => (self.deepest * size).min(self.thickness[facet as usize]),
+            (true, _) => self.deepest * size,
+            _ => DEEPEST * size,
         }
     }
 

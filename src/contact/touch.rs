@@ -117,7 +117,7 @@ pub(super) fn touch<const D: usize>(
     let (distance, facet, weights, normal) = nearest(surface, corners, (place, x), facets)?;
     let other = &surface.facets[facet as usize];
     let depth = own.clearance - distance;
-    let deepest = surface.reach_in(own, other);
+    let deepest = surface.reach_in(own, facet);
     if !(depth > ALIKE * ALIKE * own.size && -distance <= deepest) {
         return None;
     }

@@ -2,6 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
 
+use crate::tensor::Vector;
+
 /// Eigenvalues of the scaled normal equations below this fraction of the largest count as zero.
 const RANK_TOLERANCE: f64 = 1e-12;
 
@@ -95,6 +97,25 @@ impl Trial {
             off,
         }
     }
+}
+
+/// Weights of places at `arms` from a place, exact for affine fields there and none of them negative, that are nearest to `prior`; none where the place does not lie among them.
+pub(crate) fn positive_weights<const D: usize>(
+    arms: &[Vector<D>],
+    prior: &[f64],
+) -> Option<Vec<f64>> {
+    let sum: f64 = prior.iter().sum();
+    let prior: Vec<f64> = prior.iter().map(|w| w / sum).collect();
+    let rows = DMatrix::from_fn(1 + D, arms.len(), |r, k| match r {
+        0 => 1.0,
+        _ => arms[k][r - 1],
+    });
+    let mut missing = DVector::zeros(1 + D);
+    missing[0] = 1.0;
+    missing -= &rows * DVector::from_column_slice(&prior);
+    let change = least_change(&rows, &prior, &missing, Bound::AtLeast(0.0)).ok()?;
+    let weights = prior.iter().zip(change).map(|(w, c)| w * (1.0 + c));
+    Some(weights.map(|w| w.max(0.0)).collect())
 }
 
 /// Minimises `½ Σ d Δ²` subject to `Σ_k b_ck d_k Δ_k = missing_c` and `1 + Δ ≥ bound`; `rows` holds b, `shares` d.

@@ -375,11 +375,10 @@ impl<'a, const D: usize> Loads<'a, D> {
         mut add: impl FnMut(usize, Vector<D>),
     ) {
         let mesh = &self.model.mesh;
+        // a node at the seam that is no site hands its force on
         let mut on_node = |n: u32, f: Vector<D>| {
-            // a node at the seam that is no site hands its force on
-            for (site, w) in self.model.node_shares(n as usize) {
-                add(site as usize, f * w);
-            }
+            let sites = self.model.node_shares(n as usize);
+            sites.for_each(|(site, w)| add(site as usize, f * w));
         };
         let none = Vector::zeros();
         for facet in &target.facets {
@@ -394,12 +393,19 @@ impl<'a, const D: usize> Loads<'a, D> {
         }
         for &c in &target.cells {
             let force = |x: &Vector<D>| field(x, &none);
-            let forces = match self.body_forces {
-                BodyForces::Consistent => fem::body_force_vector(mesh, c, force),
-                BodyForces::Lumped => fem::lumped_body_force_vector(mesh, c, force),
-            };
-            for (n, f) in forces {
-                on_node(n, f);
+            match self.body_forces {
+                BodyForces::Consistent => {
+                    for (n, f) in fem::body_force_vector(mesh, c, force) {
+                        let sites = self.model.node_shares(n as usize);
+                        sites.for_each(|(site, w)| add(site as usize, f * w));
+                    }
+                }
+                BodyForces::Lumped => {
+                    for (n, f) in fem::lumped_body_force_vector(mesh, c, force) {
+                        let sites = self.model.mass_shares(n as usize);
+                        sites.for_each(|(site, w)| add(site as usize, f * w));
+                    }
+                }
             }
         }
         target.parts.each(target.detail, field, add);

@@ -26,6 +26,7 @@
 //! | `scale` | static solves of up to a million unknowns: iterations, time, memory |
 //! | `bobaru` | the tables of \[Bobaru2009\] |
 //! | `meshes` | scenes as people type them, on meshes that fit nothing |
+//! | `zones` | zones that are drawn, on such meshes |
 //! | `quadratic` | cells of second order: affine fields, orders, known solutions |
 //! | `estimates` | the estimates of [SAND2015-7998] chapters 2 and 3, and the ghost strain of figure 2.1 |
 //! | `emmrich-weckner` | the nonlocal bar of \[EmmrichWeckner2007\] |
@@ -75,6 +76,7 @@ pub mod typed;
 pub mod variable_horizon;
 pub mod wave;
 pub mod weights;
+pub mod zones;
 
 pub use balance::balance;
 pub use patch::patch;
@@ -246,6 +248,11 @@ pub const SUITES: &[Suite] = &[
         name: "meshes",
         about: "scenes as people type them, on meshes that fit nothing: loads, affine fields, order, motion, fracture",
         run: meshes::run,
+    },
+    Suite {
+        name: "zones",
+        about: "zones drawn by seeds on such meshes: affine fields, steps in time, loads and supports across them",
+        run: zones::run,
     },
     Suite {
         name: "quadratic",

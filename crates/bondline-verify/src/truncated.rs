@@ -401,8 +401,8 @@ fn difference<const D: usize>(case: &Case, material: Material) -> Result<f64, St
         case.text::<D>(&otherwise).replace(typed::FREE, "")
     };
     let mut places = Vec::new();
-    let coupled = scene::samples(&text(None), &mut places)?;
-    let local = scene::samples(&text(Some("\"local\"")), &mut places)?;
+    let coupled = scene::samples(&text(None), &[], &[], &mut places)?;
+    let local = scene::samples(&text(Some("\"local\"")), &[], &[], &mut places)?;
     let (mut error, mut norm) = (0.0, 0.0);
     for (u, v) in coupled.displacement.iter().zip(&local.displacement) {
         if let (Some(u), Some(v)) = (u, v) {

@@ -82,11 +82,11 @@ impl<const D: usize> Face<D> {
 }
 
 impl<const D: usize> PatchCells<D> {
-    /// The cells whose centre is wanted and lies between two corners, and a rim of so many cells around them; with a skin those alone whose rim is whole, and none whose rim would not leave a cell of elements at places that it is kept off.
+    /// The cells whose centre is wanted and lies between two corners, and a rim of so many cells around them; with a skin those alone of whose rim so large a part of each cell is in the body, and none whose rim would not leave a cell of elements at places that it is kept off.
     pub fn new(
         mesh: &Mesh<D>,
         cells: Cells<D>,
-        (width, has_skin, orders_parts): (i32, bool, bool),
+        (width, skin, orders_parts): (i32, Option<f64>, bool),
         (low, high): (Vector<D>, Vector<D>),
         places: &Places<'_, D>,
     ) -> Result<Self, PatchError> {
@@ -125,10 +125,12 @@ impl<const D: usize> PatchCells<D> {
         patch.zone = (wanted.into_iter())
             .filter(|index| patch.is_material(index))
             .collect();
-        if has_skin {
+        if let Some(least) = skin {
             let around =
                 |index: &Index<D>| block(index.map(|i| i - width), index.map(|i| i + width));
-            let is_whole = |index: &Index<D>| around(index).all(|other| !patch.is_cut(&other));
+            let is_whole = |index: &Index<D>| {
+                !patch.is_cut(index) && around(index).all(|other| patch.part(&other) > least - PART)
+            };
             let all = patch.zone.len();
             let inner = patch.zone.iter().filter(|index| is_whole(index));
             patch.zone = inner.copied().collect();
@@ -188,7 +190,7 @@ impl<const D: usize> PatchCells<D> {
     }
 
     /// Returns true if anything of the body lies in a cell.
-    fn is_material(&self, index: &Index<D>) -> bool {
+    pub fn is_material(&self, index: &Index<D>) -> bool {
         self.part(index) > PART
     }
 
@@ -233,8 +235,13 @@ impl<const D: usize> PatchCells<D> {
     /// Takes the cells around a place into the patch, and returns true if there are some that lie in the body.
     pub fn absorb(&mut self, place: &Vector<D>) -> bool {
         let at = self.cells.index(place);
+        self.take(block(at.map(|i| i - 1), at.map(|i| i + 1)))
+    }
+
+    /// Takes cells into the patch, and returns true if there are some that lie in the body.
+    pub fn take(&mut self, cells: impl IntoIterator<Item = Index<D>>) -> bool {
         let before = self.all.len();
-        for index in block(at.map(|i| i - 1), at.map(|i| i + 1)) {
+        for index in cells {
             self.add(index);
         }
         self.fill();

@@ -52,7 +52,7 @@ pub struct Patched<const D: usize> {
 
 /// A mesh with its patch, but for the nodes that follow others.
 pub(super) struct Composite<'s, const D: usize> {
-    patched: Patched<D>,
+    pub patched: Patched<D>,
     /// The mesh before with a node for each side of the patch.
     sides: &'s Sides<D>,
     /// New numbers of its nodes; [`NONE`] where none of its cells is left.
@@ -315,23 +315,22 @@ impl<'s, const D: usize> Composite<'s, D> {
             .find(|facet| sorted(facet.clone()) == wanted)
     }
 
-    /// The mesh with the nodes that follow others, in displacement by `rows`, in masses by `shares`.
-    pub fn with_followers(self, rows: &Rows<D>, shares: &Rows<D>) -> Patched<D> {
-        let mut patched = self.patched;
+    /// Rows by the numbers of nodes.
+    pub fn numbered(&self, rows: &Rows<D>) -> BTreeMap<u32, Vec<(u32, f64)>> {
         let number = |place: &Place<D>| match place {
             Place::Mesh(n) => self.node[*n as usize],
             Place::Patch(node) => self.node_of_patch[node],
         };
-        let numbered = |rows: &Rows<D>| {
-            let rows = rows.iter().map(|(place, row)| {
-                let row = row.iter().map(|(followed, w)| (number(followed), *w));
-                (number(place), row.collect())
-            });
-            rows.collect()
-        };
-        patched.mesh.embedded.followers = numbered(rows);
-        patched.mesh.embedded.shares = numbered(shares);
-        patched
+        let rows = rows.iter().map(|(place, row)| {
+            let row = row.iter().map(|(followed, w)| (number(followed), *w));
+            (number(place), row.collect())
+        });
+        rows.collect()
+    }
+
+    /// The number of a node of the patch.
+    pub fn number_of(&self, node: &Index<D>) -> u32 {
+        self.node_of_patch[node]
     }
 }
 

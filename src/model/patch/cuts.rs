@@ -1,9 +1,9 @@
 //! Elements of a mesh that a patch cuts or covers.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
-    cells::{GOOD, PatchCells},
+    cells::{Face, GOOD, Index, PatchCells},
     error::PatchError,
     moments::PartMoments,
 };
@@ -12,6 +12,7 @@ use crate::{
     mesh::{CellShape, CutCell, Mesh},
     model::simplex::simplices_of,
     parallel,
+    tensor::Vector,
 };
 
 /// Part of a cell's volume below which nothing is left of it.
@@ -20,14 +21,24 @@ pub(super) const NOTHING: f64 = 1e-10;
 /// Distance of a corner of a parallelogram from where the others want it, over its shortest side, that rounding leaves.
 const ROUNDING: f64 = 1e-10;
 
+/// Mean of a shape function over what is left of a cell, over that in the whole cell, below which that is too little for the node.
+const BORNE: f64 = 0.3;
+
 /// The elements that a patch cuts.
 pub(super) struct Cuts {
     /// Rules of those of which a part is left; none of those that the patch covers.
     of_cell: BTreeMap<u32, Option<CutCell>>,
+    /// Those of which too little is left for all their nodes.
+    poor: BTreeSet<u32>,
 }
 
 impl Cuts {
-    pub fn new<const D: usize>(mesh: &Mesh<D>, patch: &PatchCells<D>) -> Result<Self, PatchError> {
+    /// The elements that a patch cuts; `has_masses` if every node needs a mass.
+    pub fn new<const D: usize>(
+        mesh: &Mesh<D>,
+        patch: &PatchCells<D>,
+        has_masses: bool,
+    ) -> Result<Self, PatchError> {
         let mut met: Vec<u32> = (patch.all.iter())
             .flat_map(|index| patch.held[index].iter().map(|part| part.0))
             // also what is divided since it touches the patch
@@ -61,7 +72,15 @@ impl Cuts {
         for cut in found {
             of_cell.extend(cut?);
         }
-        Ok(Self { of_cell })
+        let is_poor = |c: u32, rule: &CutCell| {
+            rule.fraction < GOOD || has_masses && least_mean(mesh, c as usize, rule) < BORNE
+        };
+        let rules = of_cell.iter();
+        let poor = rules.filter_map(|(&c, rule)| is_poor(c, rule.as_ref()?).then_some(c));
+        Ok(Self {
+            poor: poor.collect(),
+            of_cell,
+        })
     }
 
     /// Returns true if the patch covers a cell.
@@ -76,8 +95,7 @@ impl Cuts {
 
     /// Returns true if enough is left of a cell for its nodes.
     pub fn is_good(&self, c: u32) -> bool {
-        let rule = self.of_cell.get(&c);
-        rule.is_none_or(|rule| rule.as_ref().is_some_and(|rule| rule.fraction >= GOOD))
+        !self.poor.contains(&c) && !self.is_covered(c)
     }
 
     /// Returns true if the patch covers a cell or a part of it.
@@ -85,10 +103,47 @@ impl Cuts {
         self.of_cell.contains_key(&c)
     }
 
+    /// Cells of the lattice between the patch and a surface of the body whose elements have too little left for nodes of their own: these would follow elements far along the strip.
+    pub fn strips<const D: usize>(
+        &self,
+        mesh: &Mesh<D>,
+        patch: &PatchCells<D>,
+        is_held: &dyn Fn(u32) -> bool,
+    ) -> Vec<Index<D>> {
+        let bears = |c: u32| self.is_good(c) || mesh.cell(c as usize).iter().any(|&n| is_held(n));
+        let faces = patch.faces().into_iter();
+        let strips = faces.filter_map(|face| {
+            let cell = face.neighbour();
+            let beyond = Face { cell, ..face }.neighbour();
+            let left = patch.held[&cell]
+                .iter()
+                .filter(|(c, _)| !self.is_covered(*c));
+            let is_strip = !patch.is_material(&beyond) && !left.into_iter().any(|(c, _)| bears(*c));
+            is_strip.then_some(cell)
+        });
+        strips.collect()
+    }
+
     /// The cells that are cut.
     pub fn cut(&self) -> impl Iterator<Item = (u32, &CutCell)> {
         (self.of_cell.iter()).filter_map(|(&c, rule)| Some((c, rule.as_ref()?)))
     }
+}
+
+/// The least mean of a shape function of a cell over what is left of it, over that in the whole cell.
+fn least_mean<const D: usize>(mesh: &Mesh<D>, c: usize, rule: &CutCell) -> f64 {
+    let (mut size, mut sums) = (0.0, [0.0; 8]);
+    let mut count = 0;
+    for (xi, w) in &rule.mass {
+        let (shape, nodes) = fem::shape_values(mesh, c, &Vector::from_fn(|i, _| xi[i]));
+        count = nodes;
+        size += w;
+        sums.iter_mut()
+            .zip(shape)
+            .for_each(|(sum, n)| *sum += w * n);
+    }
+    let least = sums[..count.min(8)].iter().copied();
+    least.fold(f64::INFINITY, f64::min) * count as f64 / size
 }
 
 /// The part of a cell outside the patch, of a divided one by its simplices, and the volume inside.

@@ -126,6 +126,14 @@ fn best_of_ring<const D: usize>(
     Some(least.1)
 }
 
+/// A row with the nodes that follow others in the place of these.
+pub(super) fn substituted<const D: usize>(row: &Row<D>, rows: &Rows<D>) -> Row<D> {
+    gathered(row.iter().flat_map(|&(place, w)| match rows.get(&place) {
+        Some(others) => others.iter().map(|&(other, v)| (other, v * w)).collect(),
+        None => vec![(place, w)],
+    }))
+}
+
 /// The rows with nodes alone that follow none.
 ///
 /// # Errors
@@ -140,10 +148,7 @@ pub(super) fn resolved<const D: usize>(
             if row.iter().all(|(place, _)| !rows.contains_key(place)) {
                 return Some(row);
             }
-            row = gathered(row.iter().flat_map(|&(place, w)| match rows.get(&place) {
-                Some(others) => others.iter().map(|&(other, v)| (other, v * w)).collect(),
-                None => vec![(place, w)],
-            }));
+            row = substituted(&row, rows);
         }
         None
     };

@@ -8,6 +8,7 @@
 //! | `cuts.rs` | elements that Γ cuts: what is left of them |
 //! | `plane_parts.rs` | plane parts of Γ, in an order in which rows of their nodes resolve |
 //! | `tie.rs` | the displacement of the nodes of Γ, by a dual mortar |
+//! | `shares.rs` | masses that nodes hand on which follow others |
 //! | `followers.rs` | nodes that no good element holds |
 //! | `sides.rs` | nodes inside the patch that elements on different sides share |
 //! | `left.rs` | what is left of cut cells, as simplices |
@@ -37,6 +38,7 @@ mod places;
 mod plane_parts;
 mod replaced;
 mod rows;
+mod shares;
 mod sides;
 mod surface;
 mod tie;
@@ -47,7 +49,14 @@ pub use self::{
 
 use std::collections::BTreeMap;
 
-use self::{cells::PatchCells, composite::Composite, cuts::Cuts, rows::Place, sides::Sides};
+use self::{
+    cells::PatchCells,
+    composite::Composite,
+    cuts::Cuts,
+    rows::{Place, Rows},
+    sides::Sides,
+    tie::Tied,
+};
 use crate::{fem, mesh::Mesh, model::simplex::Cells, tensor::Vector};
 
 /// Lattice of a patch.
@@ -96,26 +105,59 @@ pub fn embed<const D: usize>(
     places: Places<'_, D>,
     material: &dyn Fn(u32) -> u16,
 ) -> Result<Patched<D>, PatchError> {
-    match grown(mesh, lattice, places, material, false) {
-        Err(first) if D == 3 => grown(mesh, lattice, places, material, true).map_err(|_| first),
-        found => found,
+    let orders: &[bool] = if D == 3 { &[false, true] } else { &[false] };
+    // at rest no node needs a mass
+    let takes_strips: &[bool] = if lattice.has_masses {
+        &[true, false]
+    } else {
+        &[false]
+    };
+    let ways = takes_strips.iter().flat_map(|&takes_strips| {
+        orders.iter().map(move |&orders_parts| Growth {
+            orders_parts,
+            takes_strips,
+        })
+    });
+    let mut first = None;
+    for way in ways {
+        match grown(mesh, lattice, places, material, way) {
+            Err(error @ (PatchError::Empty { .. } | PatchError::Large { .. })) => {
+                return Err(error);
+            }
+            Err(error) => first = first.or(Some(error)),
+            found => return found,
+        }
     }
+    Err(first.expect("some way was tried"))
 }
 
-/// The same with nodes of the rim that belong to plane parts by their axes, or by an order of the parts: the patch then grows less, where a staircase has steps of one cell.
+/// Growth of a patch to what it must have too.
+#[derive(Clone, Copy)]
+struct Growth {
+    /// True if nodes of the rim belong to plane parts by an order of these, not by their axes: the patch then grows less, where a staircase has steps of one cell.
+    orders_parts: bool,
+    /// True if the rim goes to a surface that no element with enough left lies before.
+    takes_strips: bool,
+}
+
+/// The same with a patch that grows in one way.
 fn grown<const D: usize>(
     mesh: &Mesh<D>,
     lattice: PatchLattice<D>,
     places: Places<'_, D>,
     material: &dyn Fn(u32) -> u16,
-    orders_parts: bool,
+    growth: Growth,
 ) -> Result<Patched<D>, PatchError> {
     let cells = lattice.cells(&mesh.bounds().0);
     let width = 1 + (lattice.reach / cells.spacing - 1e-6).ceil() as i32;
+    let skin = (lattice.has_skin).then(|| match lattice.per_cell {
+        1 => 1.0,
+        n => 1.0 / f64::from(n),
+    });
     let mut patch = PatchCells::new(
         mesh,
         cells,
-        (width, lattice.has_skin, orders_parts),
+        (width, skin, growth.orders_parts),
         lattice.within,
         &places,
     )?;
@@ -123,16 +165,31 @@ fn grown<const D: usize>(
     for _ in 0..ABSORBED {
         patch.check_materials(material)?;
         patch.check_connected(mesh)?;
-        let found = embedded(mesh, &patch, (is_held, material), lattice);
+        let (cut, replaced) = replaced::replaced(mesh, &patch);
+        let cuts = Cuts::new(cut.as_ref(), &patch, lattice.has_masses)?;
+        let strips = match growth.takes_strips {
+            true => cuts.strips(cut.as_ref(), &patch, is_held),
+            false => Vec::new(),
+        };
+        if !strips.is_empty() {
+            match patch.take(strips) {
+                true => continue,
+                false => return Err(PatchError::Grown),
+            }
+        }
+        let found = embedded((cut.as_ref(), &cuts), &patch, (is_held, material), lattice);
         let Err(error) = &found else {
-            return found;
+            return found.map(|patched| Patched {
+                replaced,
+                ..patched
+            });
         };
         // a strip between the rim and a surface that no element carries: the rim goes to the surface
         if !error.place().is_some_and(|x| patch.absorb(&x)) {
             return found;
         }
     }
-    embedded(mesh, &patch, (is_held, material), lattice)
+    Err(PatchError::Grown)
 }
 
 /// Strips of elements that a rim takes in, at most.
@@ -140,70 +197,121 @@ const ABSORBED: usize = 60;
 
 /// The mesh with these cells as its patch.
 fn embedded<const D: usize>(
-    mesh: &Mesh<D>,
+    (mesh, cuts): (&Mesh<D>, &Cuts),
     patch: &PatchCells<D>,
     (is_held, material): (&dyn Fn(u32) -> bool, &dyn Fn(u32) -> u16),
     lattice: PatchLattice<D>,
 ) -> Result<Patched<D>, PatchError> {
-    let (mesh, replaced) = replaced::replaced(mesh, patch);
-    let mesh = mesh.as_ref();
-    let cuts = Cuts::new(mesh, patch)?;
     if lattice.may_part {
-        sides::check_elements(mesh, patch, &cuts)?;
+        sides::check_elements(mesh, patch, cuts)?;
     }
-    let sides = Sides::new(mesh, patch, &cuts);
+    let sides = Sides::new(mesh, patch, cuts);
     let is_held = |n: u32| is_held(sides.origin(n));
-    let mut rows = followers::of_mesh(&sides.mesh, &cuts, &is_held, material)?;
+    let mut rows = followers::of_mesh(&sides.mesh, cuts, &is_held, material)?;
     rows.extend(followers::of_rim(patch)?);
-    let tied = tie::rows(&sides.mesh, patch, &cuts);
-    let (mut all, mut shares) = (rows.clone(), rows);
-    for (node, own) in tied {
-        all.insert(Place::Patch(node), own.row);
-        shares.insert(Place::Patch(node), own.share);
-    }
-    let composite = Composite::new((mesh, &sides), patch, &cuts);
+    let tied = tie::rows(&sides.mesh, patch, cuts);
+    let mut all = rows.clone();
+    all.extend(
+        tied.rows
+            .iter()
+            .map(|(n, row)| (Place::Patch(*n), row.clone())),
+    );
+    let mut composite = Composite::new((mesh, &sides), patch, cuts);
     let all = followers::resolved(&all, patch)?;
-    let shares = followers::resolved(&shares, patch)?;
-    let mut patched = composite.with_followers(&all, &shares);
-    if lightest(&patched, &patched.mesh.embedded.followers).is_none() {
-        patched.mesh.embedded.shares.clear();
-    } else if lattice.has_masses
-        && let Some((n, volume)) = lightest(&patched, &patched.mesh.embedded.shares)
-    {
-        return Err(PatchError::Mass {
+    composite.patched.mesh.embedded.followers = composite.numbered(&all);
+    composite.patched.skin = patch.skin;
+    composite.patched.kept_off = patch.kept_off;
+    share_masses(
+        &mut composite,
+        (&sides.mesh, patch, cuts),
+        (rows, tied),
+        lattice,
+    )?;
+    Ok(composite.patched)
+}
+
+/// Gives nodes that follow others rows of their own for masses, where those of their displacement leave none to a node, and in time.
+fn share_masses<const D: usize>(
+    composite: &mut Composite<'_, D>,
+    (mesh, patch, cuts): (&Mesh<D>, &PatchCells<D>, &Cuts),
+    (mut rows, tied): (Rows<D>, Tied<D>),
+    lattice: PatchLattice<D>,
+) -> Result<(), PatchError> {
+    let patched = &composite.patched;
+    // small masses shorten the step: beside cells of one spacing they may be, since there are no smaller ones
+    let light = match lattice.has_masses && lattice.per_cell > 1 {
+        true => SMALL,
+        false => LIGHT,
+    };
+    let volume = volumes(patched);
+    let by_ties = lightest(
+        patched,
+        volume.clone(),
+        &patched.mesh.embedded.followers,
+        light,
+    );
+    if by_ties.is_none() && !lattice.has_masses {
+        return Ok(());
+    }
+    let own = shares::of_nodes(mesh, patch, &tied.beyond);
+    for (node, row) in tied.rows {
+        let row = own.get(&node).map_or(row, |own| own.1.clone());
+        rows.insert(Place::Patch(node), row);
+    }
+    let mut rows = followers::resolved(&rows, patch)?;
+    if lattice.has_masses {
+        let volume_of = |node: &_| volume[composite.number_of(node) as usize];
+        let pooled = shares::pooled(mesh, patch, &tied.beyond, &own, volume_of);
+        let changed: Rows<D> = (pooled.iter())
+            .map(|(node, (row, _))| (Place::Patch(*node), followers::substituted(row, &rows)))
+            .collect();
+        rows.extend(changed);
+        shares::make_positive(mesh, (patch, cuts), &pooled, &mut rows);
+    }
+    let rows = composite.numbered(&rows);
+    let by_shares = lightest(patched, volume, &rows, light);
+    match (lattice.has_masses, by_ties, by_shares) {
+        (true, Some(_), Some((n, volume))) => Err(PatchError::Mass {
             position: patched.mesh.nodes[n as usize].iter().copied().collect(),
             volume,
-        });
+        }),
+        (true, None, Some(_)) => Ok(()),
+        _ => {
+            composite.patched.mesh.embedded.shares = rows;
+            Ok(())
+        }
     }
-    Ok(Patched {
-        skin: patch.skin,
-        kept_off: patch.kept_off,
-        replaced,
-        ..patched
-    })
 }
 
 /// Part of a cell of the rim up to which a volume is none: what rounding leaves of it.
 const LIGHT: f64 = 1e-9;
 
-/// A node of elements that follows none and has no positive volume, if there is one, where nodes that follow hand theirs on by these rows.
+/// The same of nodes whose mass shortens a step.
+const SMALL: f64 = 0.01;
+
+/// The volume of the elements that each node stands for.
+fn volumes<const D: usize>(patched: &Patched<D>) -> Vec<f64> {
+    let elements = (0..patched.mesh.cell_count()).filter(|&c| !patched.nonlocal[c]);
+    fem::nodal_volumes(&patched.mesh, elements)
+}
+
+/// A node of elements that follows none and has no larger volume than that part of a cell, if there is one, where nodes that follow hand theirs on by these rows.
 fn lightest<const D: usize>(
     patched: &Patched<D>,
+    mut volume: Vec<f64>,
     rows: &BTreeMap<u32, Vec<(u32, f64)>>,
+    light: f64,
 ) -> Option<(u32, f64)> {
     let mesh = &patched.mesh;
-    let elements = || (0..mesh.cell_count()).filter(|&c| !patched.nonlocal[c]);
-    let mut volume = fem::nodal_volumes(mesh, elements());
     for (&n, row) in rows {
         let own = std::mem::take(&mut volume[n as usize]);
         row.iter().for_each(|&(m, w)| volume[m as usize] += w * own);
     }
+    let elements = (0..mesh.cell_count()).filter(|&c| !patched.nonlocal[c]);
     let follows = |n: &u32| mesh.embedded.followers.contains_key(n);
-    let free = elements()
-        .flat_map(|c| mesh.cell(c))
-        .filter(|n| !follows(n));
+    let free = elements.flat_map(|c| mesh.cell(c)).filter(|n| !follows(n));
     let least = free.min_by(|&&a, &&b| volume[a as usize].total_cmp(&volume[b as usize]))?;
     let own = volume[*least as usize];
     let cell = mesh.embedded.covered.edge.powi(D as i32);
-    (own <= LIGHT * cell).then_some((*least, own))
+    (own <= light * cell).then_some((*least, own))
 }

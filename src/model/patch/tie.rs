@@ -4,7 +4,7 @@
 //! plane part of Γ that the node belongs to. On each face ψ = A φ for the nodes that belong to its part, `∫ ψ_i φ_j = δ_ij ∫ φ_j` among them and `Σ ψ_i = 1`, of the least norm. Nodes of a face that belong to
 //! another part, and those that follow the rim where the surface of the body leaves too little of its elements, stay in the equation. Where that surface cuts the face, integrals are over what has elements beyond it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -45,20 +45,15 @@ struct FaceRow<const D: usize> {
     terms: Row<D>,
 }
 
-/// Rows of a node of Γ in nodes of the mesh and of the patch.
-pub(super) struct TiedRow<const D: usize> {
-    /// By the mortar.
-    pub row: Row<D>,
-    /// By the shape functions of the element around the node: none is negative where that lies in one.
-    pub share: Row<D>,
+/// The nodes of Γ that follow the mesh by the mortar.
+pub(super) struct Tied<const D: usize> {
+    pub rows: BTreeMap<Index<D>, Row<D>>,
+    /// The cells of the mesh beyond the faces around each.
+    pub beyond: BTreeMap<Index<D>, BTreeSet<u32>>,
 }
 
-/// The rows of each node of Γ that follows the mesh by the mortar.
-pub(super) fn rows<const D: usize>(
-    mesh: &Mesh<D>,
-    patch: &PatchCells<D>,
-    cuts: &Cuts,
-) -> BTreeMap<Index<D>, TiedRow<D>> {
+/// Ties the nodes of Γ to the mesh.
+pub(super) fn rows<const D: usize>(mesh: &Mesh<D>, patch: &PatchCells<D>, cuts: &Cuts) -> Tied<D> {
     let all = patch.faces();
     let tied = parallel::map(all.len(), 4, |f| tied_face(mesh, patch, cuts, &all[f]));
     let tied: Vec<TiedFace<D>> = tied.into_iter().flatten().collect();
@@ -74,47 +69,22 @@ pub(super) fn rows<const D: usize>(
         sum.0 += own.diagonal;
         sum.1.extend(own.terms);
     }
-    let mut shares = shares(mesh, patch, &tied);
-    (sums.into_iter())
-        .map(|(node, (diagonal, row))| {
-            let row = gathered(row).into_iter();
-            let row: Row<D> = row.map(|(n, w)| (n, w / diagonal)).collect();
-            let share = shares.remove(&node).unwrap_or_else(|| row.clone());
-            (node, TiedRow { row, share })
-        })
-        .collect()
-}
-
-/// The shape functions at each node of Γ of the element beyond that holds it, or comes nearest to that.
-fn shares<const D: usize>(
-    mesh: &Mesh<D>,
-    patch: &PatchCells<D>,
-    tied: &[TiedFace<D>],
-) -> BTreeMap<Index<D>, Row<D>> {
-    let mut best: BTreeMap<Index<D>, (f64, Row<D>)> = BTreeMap::new();
-    for TiedFace { face, parts, .. } in tied {
-        let mut cells: Vec<u32> = parts.iter().map(|part| part.0).collect();
-        cells.dedup();
-        for node in face.nodes() {
-            let x = patch.node(&node);
-            for &c in &cells {
-                let Some(xi) = fem::reference_of(mesh, c as usize, &x) else {
-                    continue;
-                };
-                let (shape, count) = fem::shape_values(mesh, c as usize, &xi);
-                let least = shape[..count]
-                    .iter()
-                    .fold(1.0, |least: f64, w| least.min(*w));
-                if best.get(&node).is_none_or(|known| known.0 < least) {
-                    let nodes = mesh.cell(c as usize).iter().map(|&n| Place::Mesh(n));
-                    best.insert(node, (least, nodes.zip(shape).collect()));
-                }
-            }
+    let mut beyond: BTreeMap<Index<D>, BTreeSet<u32>> = BTreeMap::new();
+    for TiedFace { face, parts, .. } in &tied {
+        let nodes = face.nodes().into_iter();
+        for node in nodes.filter(|node| sums.contains_key(node)) {
+            let own = beyond.entry(node).or_default();
+            own.extend(parts.iter().map(|part| part.0));
         }
     }
-    (best.into_iter())
-        .map(|(node, (_, row))| (node, row))
-        .collect()
+    let rows = sums.into_iter().map(|(node, (diagonal, row))| {
+        let row = gathered(row).into_iter();
+        (node, row.map(|(n, w)| (n, w / diagonal)).collect())
+    });
+    Tied {
+        rows: rows.collect(),
+        beyond,
+    }
 }
 
 /// A face with the parts of the mesh beyond it; none where there are none.

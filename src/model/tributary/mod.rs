@@ -82,6 +82,7 @@ impl Tributary {
             volume,
             mixed: by_material,
             zone,
+            inertia: None,
             shares: None,
         }
     }
@@ -116,7 +117,16 @@ impl<const D: usize> Model<D> {
     /// Finds the part of each site, and what rows are scaled by.
     pub(crate) fn share_out(&mut self) {
         let mut tributary = Tributary::new(self);
-        if tributary.volume.iter().any(|v| *v <= 0.0) {
+        let is_light = tributary.volume.iter().any(|v| *v <= 0.0);
+        // rows of an energy are those of their loads whatever the masses are
+        let has_inertia = self.has_energy && !self.mesh.embedded.shares.is_empty();
+        if has_inertia && !is_light {
+            self.tributary.shares = shares::shares(self);
+            let mut inertia = Tributary::new(self);
+            inertia.shares = self.tributary.shares.take();
+            tributary.inertia = Some(Box::new(inertia));
+        }
+        if is_light {
             // by the volumes that sites have of their own
             self.tributary.shares = shares::shares(self);
             if self.tributary.shares.is_some() {

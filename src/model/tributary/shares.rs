@@ -3,13 +3,11 @@
 //! A node of the seam follows a fit to the sites within a horizon: to points alone where elements are wider than that, so that it is extrapolated. The transpose of such weights hands a few points many times the volume
 //! of their cells, and others a negative one, for which no row can stand. Any weights that are exact for affine fields keep totals and first moments, so these are as near as possible to the volumes of the sites around, and none is negative.
 
-use nalgebra::{DMatrix, DVector};
-
 use crate::{
     assembly::Transfer,
     model::{Bins, Model},
     parallel,
-    peridynamics::bounded_least_norm::{Bound, least_change},
+    peridynamics::bounded_least_norm::positive_weights,
     shape::Barriers,
     tensor::Vector,
 };
@@ -25,6 +23,14 @@ impl<const D: usize> Model<D> {
             .shares
             .as_ref()
             .unwrap_or(&self.node_transfer);
+        transfer.row(node)
+    }
+
+    /// Sites and weights that a node hands its mass on to, and in time a body force.
+    pub(crate) fn mass_shares(&self, node: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
+        let tributary = &self.tributary;
+        let own = tributary.inertia.as_deref().unwrap_or(tributary);
+        let transfer = own.shares.as_ref().unwrap_or(&self.node_transfer);
         transfer.row(node)
     }
 }
@@ -96,21 +102,12 @@ fn positive<const D: usize>(
 ) -> Option<Vec<(u32, f64)>> {
     let arm = |k: &usize| (positions[*k] - x) / reach;
     let near = |k: &usize| 1.0 - arm(k).norm_squared();
-    let mut prior: Vec<f64> = seen
+    let prior: Vec<f64> = seen
         .iter()
         .map(|k| volume(k).max(0.0) * near(k).max(0.0))
         .collect();
-    let sum: f64 = prior.iter().sum();
-    prior.iter_mut().for_each(|w| *w /= sum);
-    let rows = DMatrix::from_fn(1 + D, seen.len(), |r, k| match r {
-        0 => 1.0,
-        _ => arm(&seen[k])[r - 1],
-    });
-    let mut missing = DVector::zeros(1 + D);
-    missing[0] = 1.0;
-    missing -= &rows * DVector::from_column_slice(&prior);
-    let change = least_change(&rows, &prior, &missing, Bound::AtLeast(0.0)).ok()?;
-    let weights = prior.iter().zip(change).map(|(w, c)| w * (1.0 + c));
+    let arms: Vec<Vector<D>> = seen.iter().map(arm).collect();
+    let weights = positive_weights(&arms, &prior)?;
     let found = seen.iter().zip(weights).filter(|(_, w)| *w > 0.0);
     Some(found.map(|(&k, w)| (k as u32, w)).collect())
 }

@@ -11,6 +11,8 @@ pub struct Tributary {
     pub mixed: Vec<(u32, u16, f64)>,
     /// Volume of the peridynamic zone, less voids \[m^D\].
     pub zone: f64,
+    /// Parts by which masses go, where nodes hand these on by other weights than loads.
+    pub(super) inertia: Option<Box<Self>>,
     /// Weights by which nodes hand on loads and masses, where it is not those of their displacement.
     pub(crate) shares: Option<Transfer>,
 }
@@ -19,8 +21,9 @@ impl Tributary {
     /// Lumped mass of every site \[kg\]; `density` gives ρ [kg/m^D] of a material's number, `own` is that of the points.
     pub fn masses(&self, own: u16, density: impl Fn(u16) -> f64) -> Vec<f64> {
         let of_points = density(own);
-        let mut masses: Vec<f64> = self.volume.iter().map(|v| v * of_points).collect();
-        for &(site, material, volume) in &self.mixed {
+        let own = self.inertia.as_deref().unwrap_or(self);
+        let mut masses: Vec<f64> = own.volume.iter().map(|v| v * of_points).collect();
+        for &(site, material, volume) in &own.mixed {
             masses[site as usize] += volume * (density(material) - of_points);
         }
         masses

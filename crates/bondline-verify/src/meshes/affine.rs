@@ -24,7 +24,7 @@ const GRADIENT: [[f64; 3]; 3] = [
 
 /// A mesh as a file, and a box in its middle that elements enclose.
 #[derive(Clone)]
-pub(super) struct Family {
+pub(crate) struct Family {
     pub name: &'static str,
     pub kinematics: &'static str,
     /// Name of the file.
@@ -35,6 +35,8 @@ pub(super) struct Family {
     pub size: f64,
     /// Lowest and highest corner of the body, about.
     pub extent: [[f64; 3]; 2],
+    /// The place in the body of a place in a block between these corners.
+    pub place: fn([f64; 3]) -> [f64; 3],
     /// The zone: lowest and highest corner.
     pub zone: [[f64; 3]; 2],
     /// Part of the boundary on which displacements are prescribed.
@@ -63,6 +65,7 @@ fn plane(name: &'static str, cells: usize, place: impl Fn(f64, f64) -> [f64; 2])
         size: 1.0,
         file: "m.msh",
         extent: [[0.0; 3], [cells as f64, cells as f64, 0.0]],
+        place: |x| x,
         zone: [[4.5, 4.5, 0.0], [7.5, 7.5, 0.0]],
         boundary: "on = \"outer\"",
         around: 1.0,
@@ -70,7 +73,7 @@ fn plane(name: &'static str, cells: usize, place: impl Fn(f64, f64) -> [f64; 2])
 }
 
 /// Quadrilaterals whose inner nodes are moved by up to a fifth of a side.
-pub(super) fn jittered(cells: usize) -> Family {
+pub(crate) fn jittered(cells: usize) -> Family {
     let inner = |x: f64| x > 0.5 && x < cells as f64 - 0.5;
     plane("jittered", cells, |x, y| {
         let by = |a: f64, b: f64| match inner(x) && inner(y) {
@@ -81,17 +84,39 @@ pub(super) fn jittered(cells: usize) -> Family {
     })
 }
 
+/// Depth of a notch with straight faces at 45° in the middle of the lower side of a body.
+fn notch(x: f64, middle: f64) -> f64 {
+    (4.0 - (x - middle).abs()).max(0.0)
+}
+
+/// Quadrilaterals of a square with a notch in its left side.
+pub(crate) fn notched_plate(cells: usize) -> Family {
+    let top = cells as f64;
+    plane("notched plate", cells, |x, y| {
+        let low = notch(y, 0.5 * top);
+        [low + x / top * (top - low), y]
+    })
+}
+
+/// Tetrahedra of a block with a notch in its lower side.
+pub(crate) fn notched_block() -> Family {
+    solid("notched block", Split::Tets, 12, |[x, y, z]| {
+        let low = notch(x, 7.5);
+        [x, low + y / 15.0 * (15.0 - low), z]
+    })
+}
+
 /// Tetrahedra between surfaces that are bent.
-pub(super) fn lug(cells: usize) -> Family {
-    solid("tets of a lug", Split::Tets, cells, |x, y, z| {
+pub(crate) fn lug(cells: usize) -> Family {
+    solid("tets of a lug", Split::Tets, cells, |[x, y, z]| {
         let a = 0.05 * (x - 5.0);
         [x + 0.3 * (0.5 * y).sin(), y + 5.0 * a * a, z]
     })
 }
 
 /// Hexahedra of a bar in the shape of an arc.
-pub(super) fn bent_bar(cells: usize) -> Family {
-    solid("hexes of a bent bar", Split::Hexes, cells, |x, y, z| {
+pub(crate) fn bent_bar(cells: usize) -> Family {
+    solid("hexes of a bent bar", Split::Hexes, cells, |[x, y, z]| {
         let (r, a) = (12.0 + y, 0.06 * (x - 5.0));
         [r * a.sin() + 5.0, r * a.cos() - 12.0, z]
     })
@@ -104,7 +129,7 @@ fn noise(x: f64, y: f64) -> f64 {
 }
 
 /// The families of meshes.
-pub(super) fn families() -> Vec<Family> {
+pub(crate) fn families() -> Vec<Family> {
     vec![
         plane("matching", 12, |x, y| [x, y]),
         plane("coarser", 12, |x, y| [1.3 * x - 1.8, 1.3 * y - 1.8]),
@@ -120,6 +145,7 @@ pub(super) fn families() -> Vec<Family> {
             size: 1.0,
             file: "m.msh",
             extent: [[0.0; 3], [20.0, 20.0, 0.0]],
+            place: |x| x,
             zone: [[8.0, 8.0, 0.0], [12.0, 12.0, 0.0]],
             boundary: "inside = { without = { from = { everywhere = true }, removed = { box = { min = [0.01, 0.01], max = [19.99, 19.99] } } } }",
             around: 3.0,
@@ -144,13 +170,13 @@ fn solid(
     name: &'static str,
     split: Split,
     cells: usize,
-    place: impl Fn(f64, f64, f64) -> [f64; 3],
+    place: fn([f64; 3]) -> [f64; 3],
 ) -> Family {
     let n = cells + 1;
     let step = 1.25;
     let nodes = (0..n * n * n).map(|k| {
         let at = |i: usize| step * i as f64;
-        place(at(k % n), at(k / n % n), at(k / n / n))
+        place([at(k % n), at(k / n % n), at(k / n / n)])
     });
     let list = (0..cells * cells * cells).flat_map(|c| {
         let (i, j, k) = (c % cells, c / cells % cells, c / cells / cells);
@@ -180,6 +206,7 @@ fn solid(
         size: step,
         file: "m.msh",
         extent: [[0.0; 3], [step * cells as f64; 3]],
+        place,
         zone: [[3.5, 3.5, 3.5], [6.5, 6.5, 6.5]],
         boundary: "on = \"outer\"",
         around: step,
@@ -214,7 +241,7 @@ fn gmsh(nodes: Vec<[f64; 3]>, cells: &[Vec<usize>]) -> String {
 }
 
 /// Couplings by what a scene types, and whether they have a transition zone.
-pub(super) const COUPLINGS: [(&str, &str, bool); 6] = [
+pub(crate) const COUPLINGS: [(&str, &str, bool); 6] = [
     ("truncated", "[coupling.truncated]", false),
     ("splice", "[coupling.splice]", false),
     ("balanced", "[coupling.balanced]", false),
@@ -239,7 +266,7 @@ const LAWS: [(&str, &str); 3] = [
 ];
 
 /// The field as components of a condition.
-pub(super) fn field_text(dimensions: usize) -> String {
+pub(crate) fn field_text(dimensions: usize) -> String {
     let axes = ["x", "y", "z"];
     let component = |i: usize| {
         let terms = (0..dimensions).map(|j| format!("({:e})*{}", GRADIENT[i][j], axes[j]));
@@ -250,7 +277,7 @@ pub(super) fn field_text(dimensions: usize) -> String {
 }
 
 /// The displacement of the field at a place.
-pub(super) fn field(position: &[f64]) -> Vec<f64> {
+pub(crate) fn field(position: &[f64]) -> Vec<f64> {
     let d = position.len();
     let component = |i: usize| (0..d).map(|j| GRADIENT[i][j] * position[j]).sum();
     (0..d).map(component).collect()

@@ -124,7 +124,7 @@ fn text<const D: usize>(
 }
 
 /// The largest difference from an integral in what `check` shows of loads.
-fn worst(parts: &[Part]) -> f64 {
+pub(crate) fn worst(parts: &[Part]) -> f64 {
     let part = parts.iter().find(|p| p.name == "loads");
     let Some(part) = part else { return f64::NAN };
     let differences = part

@@ -5,7 +5,6 @@
 //! | `loads.rs` | masses, totals and first moments of loads |
 //! | `motion.rs` | growth that the proof tells of beside that of the run; discrete energy |
 //! | `affine.rs` | affine fields on eight families of meshes |
-//! | `random_zones.rs` | affine fields beside zones that are drawn: shape, place, coupling, law, lattice |
 //! | `fracture.rs` | planes pulled apart, balance of energy of bodies that break |
 //! | `order.rs` | orders of convergence to exact solutions beside every coupling |
 //! | `scene.rs` | a scene as text, run in a folder of its own, and its summary; or its model alone |
@@ -14,13 +13,12 @@
 //! A row passes, or the scene is refused with its reason, and both are counted. Nothing here builds a model by another way than a scene does.
 
 pub mod affine;
-mod deck;
+pub(crate) mod deck;
 pub mod fracture;
 pub mod gmsh;
 pub mod loads;
 mod motion;
 mod order;
-mod random_zones;
 pub mod scene;
 
 use super::{Effort, tell};
@@ -35,7 +33,6 @@ pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
         loads::run,
         motion::tables,
         affine::tables,
-        random_zones::tables,
         fracture::planes,
         fracture::balances,
     ];

@@ -125,9 +125,14 @@ pub fn check(text: &str, overrides: &[&str], files: &[(&str, &str)]) -> Result<P
 ///
 /// # Errors
 /// The message of a refusal.
-pub fn samples(text: &str, places: &mut Vec<[f64; 3]>) -> Result<Samples, String> {
-    let folder = Folder::with(&[])?;
-    let scene = load(text, &[], &folder)?;
+pub fn samples(
+    text: &str,
+    overrides: &[&str],
+    files: &[(&str, &str)],
+    places: &mut Vec<[f64; 3]>,
+) -> Result<Samples, String> {
+    let folder = Folder::with(files)?;
+    let scene = load(text, overrides, &folder)?;
     scene.samples(places, &Silent).map_err(|e| e.to_string())
 }
 

@@ -5,9 +5,14 @@
 
 use rayon::prelude::*;
 
-use super::affine::{COUPLINGS, Family, bent_bar, families, field, field_text, jittered, lug};
-use super::{deck, gmsh, scene};
-use crate::{Effort, tangents::Numbers};
+use super::draw::{Draw, PLACES, zone};
+use crate::{
+    Effort,
+    meshes::{
+        affine::{COUPLINGS, Family, bent_bar, families, field, field_text, jittered, lug},
+        deck, gmsh, scene,
+    },
+};
 use bondline::{
     observe::{
         proof::Proof,
@@ -31,25 +36,6 @@ const LAWS: [(&str, &str); 6] = [
     ("correspondence", "correspondence]\npoisson-ratio = 0.3"),
 ];
 
-/// Places of zones: about the middle, on a side, on a corner, and from side to side.
-const PLACES: [&str; 4] = ["inside", "at a side", "in a corner", "across"];
-
-/// Numbers that are drawn.
-struct Draw(Numbers);
-
-impl Draw {
-    /// A number between two others.
-    fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + 0.5 * (1.0 + self.0.draw()) * (high - low)
-    }
-
-    /// One of a list.
-    fn one<T: Copy>(&mut self, list: &[T]) -> T {
-        let k = self.within(0.0, list.len() as f64) as usize;
-        list[k.min(list.len() - 1)]
-    }
-}
-
 /// A scene that was drawn, with a mesh of a family.
 struct Case {
     family: usize,
@@ -58,66 +44,6 @@ struct Case {
     is_inside: bool,
     name: String,
     text: String,
-}
-
-/// Draws the zone of a scene, as it is typed.
-fn zone<const D: usize>(draw: &mut Draw, family: &Family, place: &str, radius: f64) -> String {
-    let [low, high] = family.extent;
-    let mut middle = [0.0; D];
-    for i in 0..D {
-        let off = 0.05 * (high[i] - low[i]);
-        middle[i] = 0.5 * (low[i] + high[i]) + draw.within(-off, off);
-    }
-    let sided = match place {
-        "at a side" => 1,
-        "in a corner" => D,
-        _ => 0,
-    };
-    let first = draw.within(0.0, D as f64) as usize;
-    for k in 0..sided {
-        let i = (first + k) % D;
-        middle[i] = draw.one(&[low[i], high[i]]) + draw.within(-0.25, 0.25) * radius;
-    }
-    let list = |x: &[f64]| format!("{x:?}");
-    let shape = match place {
-        "across" => "box",
-        _ if D == 2 => draw.one(&["box", "ball", "polygon"]),
-        _ => draw.one(&["box", "ball"]),
-    };
-    match shape {
-        "ball" => format!("ball = {{ center = {}, radius = {radius} }}", list(&middle)),
-        "polygon" => {
-            let turned = draw.within(0.0, 1.2);
-            let corners: Vec<String> = (0..5)
-                .map(|k| {
-                    let (angle, r) = (turned + 1.2566 * k as f64, radius * draw.within(0.8, 1.2));
-                    format!(
-                        "[{}, {}]",
-                        middle[0] + r * angle.cos(),
-                        middle[1] + r * angle.sin()
-                    )
-                })
-                .collect();
-            format!("polygon = [{}]", corners.join(", "))
-        }
-        _ => {
-            let mut corners = [middle; 2];
-            for i in 0..D {
-                corners[0][i] -= radius * draw.within(0.8, 1.1);
-                corners[1][i] += radius * draw.within(0.8, 1.1);
-            }
-            if place == "across" {
-                let i = first % D;
-                let whole = high[i] - low[i];
-                (corners[0][i], corners[1][i]) = (low[i] - whole, high[i] + whole);
-            }
-            format!(
-                "box = {{ min = {}, max = {} }}",
-                list(&corners[0]),
-                list(&corners[1])
-            )
-        }
-    }
 }
 
 /// Draws a scene of a family.
@@ -257,7 +183,7 @@ pub(super) fn tables(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
     let each = if effort == Effort::Quick { 6 } else { 50 };
     let mut cases = Vec::new();
     for (number, family) in families.iter().enumerate() {
-        let mut draw = Draw(Numbers(SEED + number as u64));
+        let mut draw = Draw::new(SEED + number as u64);
         for k in 0..each {
             cases.push(match family.kinematics {
                 "solid" => drawn::<3>(&mut draw, (number, family), k),
@@ -368,19 +294,6 @@ fn all_families() -> Vec<Family> {
         .find(|f| f.name == "Delaunay triangles");
     let mut list = vec![jittered(24), lug(12), bent_bar(12)];
     list.extend(triangles);
-    let second = |family: &Family| {
-        let (name, raised) = match family.name {
-            "Delaunay triangles" => ("tri6, Delaunay", gmsh::raised::<2>(&family.mesh, |_| ())),
-            "tets of a lug" => ("tet10, lug", gmsh::raised::<3>(&family.mesh, |_| ())),
-            _ => return None,
-        };
-        let mesh = raised.ok()?;
-        Some(Family {
-            name,
-            mesh,
-            ..family.clone()
-        })
-    };
     let deck = |family: &Family| {
         let mesh = deck::of_tetrahedra(&family.mesh).ok()?;
         Some(Family {
@@ -390,7 +303,7 @@ fn all_families() -> Vec<Family> {
             ..family.clone()
         })
     };
-    let more: Vec<Family> = list.iter().filter_map(second).collect();
+    let more: Vec<Family> = list.iter().filter_map(second_order).collect();
     let decks: Vec<Family> = list
         .iter()
         .filter(|f| f.name == "tets of a lug")
@@ -399,4 +312,19 @@ fn all_families() -> Vec<Family> {
     list.extend(more);
     list.extend(decks);
     list
+}
+
+/// The same body with cells of second order, of those that have a name then.
+pub(super) fn second_order(family: &Family) -> Option<Family> {
+    let (name, raised) = match family.name {
+        "Delaunay triangles" => ("tri6, Delaunay", gmsh::raised::<2>(&family.mesh, |_| ())),
+        "tets of a lug" => ("tet10, lug", gmsh::raised::<3>(&family.mesh, |_| ())),
+        _ => return None,
+    };
+    let mesh = raised.ok()?;
+    Some(Family {
+        name,
+        mesh,
+        ..family.clone()
+    })
 }
