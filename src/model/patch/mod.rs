@@ -150,10 +150,8 @@ fn grown<const D: usize>(
 ) -> Result<Patched<D>, PatchError> {
     let cells = lattice.cells(&mesh.bounds().0);
     let width = 1 + (lattice.reach / cells.spacing - 1e-6).ceil() as i32;
-    let skin = (lattice.has_skin).then(|| match lattice.per_cell {
-        1 => 1.0,
-        n => 1.0 / f64::from(n),
-    });
+    // at least one spacing of it
+    let skin = (lattice.has_skin).then(|| 1.0 / f64::from(lattice.per_cell));
     let mut patch = PatchCells::new(
         mesh,
         cells,

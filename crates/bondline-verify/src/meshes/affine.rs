@@ -283,6 +283,18 @@ pub(crate) fn field(position: &[f64]) -> Vec<f64> {
     (0..d).map(component).collect()
 }
 
+/// The largest error of a displacement in the field, over the largest one.
+pub(crate) fn error(sites: &[scene::Site]) -> f64 {
+    let (mut error, mut largest) = (0.0f64, 0.0f64);
+    for site in sites {
+        for (u, exact) in site.displacement.iter().zip(field(&site.position)) {
+            error = error.max((u - exact).abs());
+            largest = largest.max(exact.abs());
+        }
+    }
+    error / largest
+}
+
 /// The scene of one case.
 fn text(
     family: &Family,
@@ -335,14 +347,7 @@ fn row(
     };
     match scene::solve(&text, solver, &[("m.msh", &family.mesh)]) {
         Ok((summary, sites)) => {
-            let (mut error, mut largest) = (0.0f64, 0.0f64);
-            for site in &sites {
-                for (u, exact) in site.displacement.iter().zip(field(&site.position)) {
-                    error = error.max((u - exact).abs());
-                    largest = largest.max(exact.abs());
-                }
-            }
-            let error = error / largest;
+            let error = error(&sites);
             let warned = summary
                 .warnings
                 .iter()

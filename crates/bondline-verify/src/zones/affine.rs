@@ -9,7 +9,7 @@ use super::draw::{Draw, PLACES, zone};
 use crate::{
     Effort,
     meshes::{
-        affine::{COUPLINGS, Family, bent_bar, families, field, field_text, jittered, lug},
+        affine::{COUPLINGS, Family, bent_bar, error, families, field_text, jittered, lug},
         deck, gmsh, scene,
     },
 };
@@ -159,14 +159,7 @@ fn found(case: &Case, family: &Family) -> Found {
             };
         }
     };
-    let (mut error, mut largest) = (0.0f64, 0.0f64);
-    for site in &sites {
-        for (u, exact) in site.displacement.iter().zip(field(&site.position)) {
-            error = error.max((u - exact).abs());
-            largest = largest.max(exact.abs());
-        }
-    }
-    let error = error / largest;
+    let error = error(&sites);
     match error <= LIMIT || case.is_inside || error.is_nan() {
         true => Found::Enclosed(error),
         false => Found::AtSurface(of_rows(&summary.proof)),
