@@ -28,6 +28,13 @@ pub(crate) fn origin(fingerprint: u64) -> String {
     format!("bondline {VERSION}, scene {}", scene_hash(fingerprint))
 }
 
+/// A program that runs scenes.
+#[derive(Clone, Copy, Debug)]
+pub struct Program<'a> {
+    /// Commit that it was built from; none where it was not built from a clone.
+    pub commit: Option<&'a str>,
+}
+
 /// Program, scene, machine and times of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Provenance<'a> {
@@ -61,11 +68,11 @@ pub struct Provenance<'a> {
 
 impl<'a> Provenance<'a> {
     /// Provenance of a run that this process has ended on rayon's threads.
-    pub fn new(summary: &'a RunSummary, commit: Option<&'a str>, processes: usize) -> Self {
+    pub fn new(summary: &'a RunSummary, program: Program<'a>, processes: usize) -> Self {
         let now = SystemTime::now().duration_since(UNIX_EPOCH);
         Self {
             version: VERSION,
-            commit,
+            commit: program.commit,
             scene: &summary.scene,
             scene_hash: &summary.scene_hash,
             command_line: std::env::args_os()

@@ -14,7 +14,7 @@ use super::statics;
 use super::zone_placement::{self};
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::pieces::agreed;
-use crate::observe::provenance;
+use crate::observe::provenance::{self, Provenance};
 use crate::observe::summary::{Decision, RunSummary};
 use crate::progress::Progress;
 use crate::scene::draft::Draft;
@@ -41,7 +41,7 @@ fn placed<const D: usize>(
     Ok(Box::new(PlacedScene { scene, kept }))
 }
 
-/// Claims the files that a scene will write, and runs it: at rest, in time or in load steps.
+/// Claims the files that a scene will write, runs it, at rest, in time or in load steps, and writes its provenance.
 fn run<const D: usize>(
     scene: PlacedScene<D>,
     options: &RunOptions<'_>,
@@ -52,10 +52,23 @@ fn run<const D: usize>(
     let claim = || scene.output.claim(&scene.title, !is_static, processes);
     let claimed = options.writes().then(claim).transpose();
     let _claim = agreed(options.ranks, claimed, &scene.output.directory)?;
-    if is_static {
-        return statics::run(scene, options, progress);
+    let unused = scene.unused.clone();
+    let scene_hash = provenance::scene_hash(scene.fingerprint.value());
+    let path = scene.output.provenance_path();
+    let mut summary = match is_static {
+        true => statics::run(scene, options, progress)?,
+        false => with_choice(scene.scene, |scene| motion::run(scene, options, progress))?,
+    };
+    summary.warnings.extend(unused);
+    (summary.version, summary.scene_hash) = (provenance::VERSION, scene_hash);
+    // under the claim still: another run of the scene would take a file half written for a leftover
+    if let Some(program) = options.program.filter(|_| options.writes())
+        && !summary.files.is_empty()
+    {
+        let processes = options.ranks.map_or(1, Ranks::count);
+        Provenance::new(&summary, program, processes).write(&path)?;
     }
-    with_choice(scene.scene, |scene| motion::run(scene, options, progress))
+    Ok(summary)
 }
 
 /// A validated scene of any dimension.
@@ -188,22 +201,12 @@ impl AnyScene {
         if options.ranks.is_none() {
             self.fits()?;
         }
-        let unused = self.unused().to_vec();
-        let scene_hash = self.scene_hash();
-        let mut summary = each!(self, s => run(*s, options, progress))?;
-        summary.warnings.extend(unused);
-        (summary.version, summary.scene_hash) = (provenance::VERSION, scene_hash);
-        Ok(summary)
+        each!(self, s => run(*s, options, progress))
     }
 
     /// Fingerprint of all of the scene that determines its results: 16 hexadecimal digits.
     pub fn scene_hash(&self) -> String {
         provenance::scene_hash(each!(self, s => s.fingerprint.value()))
-    }
-
-    /// The file of the [`Provenance`](provenance::Provenance) of a run.
-    pub fn provenance_path(&self) -> PathBuf {
-        each!(self, s => s.output.provenance_path())
     }
 
     /// Warnings of parts of the scene that touch nothing.

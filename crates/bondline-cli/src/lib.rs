@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use bondline::observe::checkpoint::Pace;
-use bondline::observe::provenance::Provenance;
+use bondline::observe::provenance::Program;
 use bondline::observe::report as tables;
 use bondline::observe::summary::Ended;
 use bondline::progress::Silent;
@@ -353,8 +353,8 @@ fn run(
         heeds: interrupt.map(|i| &i.heeded),
         observer: None,
         ranks,
+        program: Some(Program { commit: COMMIT }),
     };
-    let provenance = scene.provenance_path();
     let is_first = ranks.is_none_or(|ranks| ranks.rank() == 0);
     let summary = match ranks {
         None => threads::on_one(|| scene.run_with(&options, &TerminalProgress::on_stderr())),
@@ -371,11 +371,6 @@ fn run(
         (false, _) => {}
         (true, true) => print(summary.json().map_err(|e| miette::miette!("{e}"))?)?,
         (true, false) => print(&summary)?,
-    }
-    if is_first && !summary.files.is_empty() {
-        let processes = ranks.map_or(1, Ranks::count);
-        let written = Provenance::new(&summary, COMMIT, processes).write(&provenance);
-        written.map_err(|e| miette::miette!("{e}"))?;
     }
     Ok(code)
 }

@@ -71,6 +71,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::observe::checkpoint::Pace;
 use crate::observe::csv::{CsvTable, Entry};
+use crate::observe::provenance::Program;
 use crate::observe::summary::RunSummary;
 use crate::observe::{ObserveError, Observer};
 use crate::progress::Progress;
@@ -104,6 +105,8 @@ pub struct RunOptions<'a> {
     pub observer: Option<&'a dyn Observer>,
     /// The processes that compute the run together, if there are several: all of them call the run, the first one writes files.
     pub ranks: Option<&'a dyn Ranks>,
+    /// The program that runs the scene; beside the outputs of one lies the [provenance](crate::observe::provenance) of the run.
+    pub program: Option<Program<'a>>,
 }
 
 impl<'a> RunOptions<'a> {
