@@ -6,7 +6,7 @@ use bondline::{
 };
 use bondline_verify::{
     Effort, balance, extremes, large_deformation, layers, partial_volumes, plasticity, quadratic,
-    surface_layer, tangents, weights, zones,
+    surface_layer, tangents, warned, weights, zones,
 };
 
 fn assert_no_short(tables: &[Table]) {
@@ -100,6 +100,17 @@ fn zones_that_are_drawn_hold_what_they_should() {
     assert_no_short(&tables);
     assert_eq!(count(&tables, "rims two spacings wide", Verdict::Pass), 4);
     assert_eq!(count(&tables, "loads and masses", Verdict::Pass), 12);
+}
+
+/// Of scenes that are drawn none that is right is refused or warned of.
+#[test]
+fn right_scenes_run_without_a_word() {
+    let tables = warned::run(Effort::Quick, &Silent);
+    for verdict in ["refused though right", "warned though right"] {
+        let mut rows = tables.iter().flat_map(|t| &t.rows);
+        let row = rows.find(|row| row.case == verdict).expect(verdict);
+        assert_eq!(row.verdict, Verdict::Pass, "{tables:#?}");
+    }
 }
 
 #[test]

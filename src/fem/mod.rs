@@ -96,7 +96,7 @@ pub use load::{
 pub use locate::{Located, Locator, reference_of};
 pub use lumping::{for_each_share, lumped_body_force_vector, nodal_volumes};
 pub use nonlinear::NonlinearElements;
-pub use superconvergent::{position_in, superconvergent_gradient};
+pub use superconvergent::{place_in, position_in, superconvergent_gradient};
 
 use crate::mesh::CellShape;
 

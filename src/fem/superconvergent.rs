@@ -6,7 +6,6 @@
 
 use super::cell::GAUSS;
 use super::element::displacement_gradient_at;
-use super::reference_cell;
 use crate::mesh::{CellShape, Mesh};
 use crate::tensor::{Tensor, Vector};
 
@@ -35,16 +34,19 @@ pub fn superconvergent_gradient<const D: usize>(
 
 /// Position \[m\] to which the value of [`superconvergent_gradient`] at the reference coordinates `xi` of cell `c` belongs: that of `xi` itself, in linear cells the centroid.
 pub fn position_in<const D: usize>(mesh: &Mesh<D>, c: usize, xi: &[f64; 3]) -> Vector<D> {
-    let shape = mesh.shapes[c];
-    match reference_cell(shape).filter(|_| shape.is_quadratic()) {
-        Some(cell) => {
-            let nodes = mesh.cell(c).iter().zip((cell.values)(xi));
-            nodes
-                .map(|(&n, share)| mesh.nodes[n as usize] * share)
-                .sum()
-        }
-        None => mesh.centroid(c),
+    match mesh.shapes[c].is_quadratic() {
+        true => place_in(mesh, c, xi),
+        false => mesh.centroid(c),
     }
+}
+
+/// Position \[m\] of reference coordinates `xi` in cell `c`.
+pub fn place_in<const D: usize>(mesh: &Mesh<D>, c: usize, xi: &[f64; 3]) -> Vector<D> {
+    let (shape, count) = super::shape_values(mesh, c, &Vector::from_fn(|i, _| xi[i]));
+    let nodes = mesh.cell(c)[..count].iter().zip(shape);
+    nodes
+        .map(|(&n, share)| mesh.nodes[n as usize] * share)
+        .sum()
 }
 
 /// Two points along each direction, and their weights at `xi`.

@@ -44,6 +44,8 @@ pub struct Embedded<const D: usize> {
     pub cut: FxHashMap<u32, CutCell>,
     /// Cut quadrilaterals and hexahedra whose shape functions are linear in simplices around their middle.
     pub divided: FxHashSet<u32>,
+    /// Cells of which too little is left for a strain of their own, each with the one whose strain they show.
+    pub shown: FxHashMap<u32, u32>,
     /// Nodes that follow others, with weights that add up to one and are exact for affine fields. The others follow none.
     pub followers: BTreeMap<u32, Vec<(u32, f64)>>,
     /// Rows by which nodes that follow hand on masses and loads, where it is not those of their displacement: as many, or none.
@@ -90,6 +92,7 @@ impl<const D: usize> Default for Embedded<D> {
         Self {
             cut: FxHashMap::default(),
             divided: FxHashSet::default(),
+            shown: FxHashMap::default(),
             followers: BTreeMap::new(),
             shares: BTreeMap::new(),
             inner: FxHashSet::default(),
@@ -166,6 +169,19 @@ impl<const D: usize> Embedded<D> {
     /// Returns true if a cell is one of the patch, which are the first of the mesh.
     pub fn is_of_patch(&self, c: usize) -> bool {
         c < self.covered.cells.len()
+    }
+
+    /// The cell whose strain a cell shows.
+    pub fn shown_by(&self, c: usize) -> usize {
+        match self.shown.is_empty() {
+            true => c,
+            false => (self.shown.get(&(c as u32))).map_or(c, |&other| other as usize),
+        }
+    }
+
+    /// Returns true if enough is left of a cell for a strain of its own.
+    pub fn has_strain(&self, c: usize) -> bool {
+        self.shown.is_empty() || !self.shown.contains_key(&(c as u32))
     }
 
     /// The rules of a cell, where only a part of it belongs to the body.

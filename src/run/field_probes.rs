@@ -2,14 +2,15 @@
 
 use super::fields::columns::{Rows, header as columns};
 use super::fields::place::{Place, Shared};
+use super::slopes::{Slope, Slopes};
 use super::solution::Solved;
 use crate::model::{Carrier, Model, Sampler};
 use crate::scene::validated::Output;
 use crate::tensor::Vector;
 
-/// Carriers of the probes; none in a scene that asks for no field.
+/// Carriers of the probes, and slopes there; none in a scene that asks for no field.
 pub(super) struct FieldProbes {
-    carriers: Vec<Option<Carrier>>,
+    carriers: Vec<Option<(Carrier, Option<Slope>)>>,
 }
 
 /// The columns of a scene's probes.
@@ -33,7 +34,11 @@ impl FieldProbes {
             };
         }
         let sampler = Sampler::new(model);
-        let carriers = output.probes.iter().map(|(_, x)| sampler.carrier(x));
+        let slopes = Slopes::new(model);
+        let carriers = output.probes.iter().map(|(_, x)| {
+            let carrier = sampler.carrier(x)?;
+            Some((carrier, slopes.at(x, carrier)))
+        });
         Self {
             carriers: carriers.collect(),
         }
@@ -47,9 +52,15 @@ impl FieldProbes {
     /// The fields at each probe; zero where nothing carries it.
     pub fn row<const D: usize>(&self, solved: &Solved<'_, D>) -> Vec<f64> {
         let (rows, shared) = (Rows::new(solved, false), Shared::of(solved));
-        let of_probe = |carrier: &Option<Carrier>| {
-            let place = carrier.map(|carrier| Place::new(solved, &shared, carrier.into()));
-            rows.at(place.as_ref())
+        let of_probe = |probe: &Option<(Carrier, Option<Slope>)>| {
+            let Some((carrier, slope)) = probe else {
+                return rows.at(None);
+            };
+            let slope = slope.as_ref().filter(|_| solved.has_slope(*carrier));
+            let slope = slope.map(|slope| slope.of_whole(solved.model, &shared.intact));
+            let place =
+                Place::of_position(solved, &shared, (*carrier, None), slope.as_deref(), None);
+            rows.at(Some(&place))
         };
         self.carriers.iter().flat_map(of_probe).collect()
     }

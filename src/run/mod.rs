@@ -21,6 +21,7 @@
 //! | `fields/` | fields of a solution, which files and tables have |
 //! | `field_probes.rs` | fields at probes with each row of a history |
 //! | `stresses.rs`, `stress_settings.rs` | stress as outputs show it |
+//! | `slopes.rs` | strain and stress between the places that carry them |
 //! | `thermal.rs` | the force on each site that a change of temperature gives |
 //! | `condition_terms.rs` | forces of conditions that depend on the displacement, on the sites of a model |
 //! | `sections.rs` | force and moment that the part of the body beyond a plane exerts on the rest |
@@ -60,6 +61,7 @@ mod rotation;
 mod samples;
 mod sections;
 pub mod setup;
+mod slopes;
 pub mod solution;
 mod solution_samples;
 mod static_contact;

@@ -62,7 +62,8 @@ impl<'m, const D: usize> Rotations<'m, D> {
         let cells: Vec<u32> = match D {
             1 => Vec::new(),
             _ => all
-                .filter(|&c| model.is_element(c) && !rest.is_objective(model, c))
+                .filter(|&c| model.is_element(c) && model.mesh.embedded.has_strain(c))
+                .filter(|&c| !rest.is_objective(model, c))
                 .map(|c| c as u32)
                 .collect(),
         };

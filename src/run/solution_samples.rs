@@ -1,14 +1,17 @@
 //! A solution at places between its nodes and points: tables along lines and at probes.
 
+use rustc_hash::FxHashMap;
+
 use super::fields::columns::{self, Rows};
 use super::fields::place::{Place, Shared};
 use super::intact::Intact;
+use super::slopes::{Slope, Slopes, Teller};
 use super::solution::Solved;
 use crate::fem::{self, Locator};
 use crate::scene::validated::FieldChoice;
 use crate::shape::Shape;
 use crate::system::Ranks;
-use crate::tensor::{AXES, Tensor, Vector};
+use crate::tensor::{AXES, Tensor, Vector, padded};
 use crate::{
     model::{Carrier, Sampler},
     parallel,
@@ -24,6 +27,23 @@ pub(super) fn table_header<const D: usize>(choice: &FieldChoice) -> Vec<String> 
 struct Sample<const D: usize> {
     displacement: Vector<D>,
     carrier: Carrier,
+    slope: Option<Slope>,
+}
+
+impl<const D: usize> Sample<D> {
+    /// The points whose families it needs the strain of.
+    fn points(&self) -> Vec<usize> {
+        let own = match (&self.slope, self.carrier) {
+            (Some(slope), _) => slope.tellers().collect(),
+            (None, Carrier::Point(site)) => vec![Teller::Point(site)],
+            (None, Carrier::Element(..)) => Vec::new(),
+        };
+        let points = own.into_iter().filter_map(|teller| match teller {
+            Teller::Point(site) => Some(site),
+            Teller::Element(_) => None,
+        });
+        points.collect()
+    }
 }
 
 /// The solution at sites and between them.
@@ -31,6 +51,7 @@ pub(super) struct SampledSolution<'a, const D: usize> {
     solved: &'a Solved<'a, D>,
     shared: Shared,
     sampler: Sampler<'a, D>,
+    slopes: Slopes<'a, D>,
     body: Locator<D>,
     tolerance: f64,
     ranks: Option<&'a dyn Ranks>,
@@ -45,6 +66,7 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
             solved,
             shared: Shared::of(solved),
             sampler: Sampler::new(model),
+            slopes: Slopes::new(model),
             body: Locator::new(&model.mesh, 0..model.mesh.cell_count()),
             tolerance: 1e-9 * (hi - lo).norm(),
             ranks,
@@ -61,29 +83,36 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
         !in_void && self.body.locate(&model.mesh, x, self.tolerance).is_some()
     }
 
-    /// In an element its strain there; among points that of the nearest point's family. `None` outside of the body.
+    /// In an element its strain there, among points theirs. `None` outside of the body.
     fn at(&self, x: &Vector<D>) -> Option<Sample<D>> {
         if !self.is_inside(x) {
             return None;
         }
         let displacement = self.sampler.displacement(x, self.solved.displacement)?;
+        let carrier = self.sampler.carrier(x)?;
+        let slope = match self.solved.has_slope(carrier) {
+            true => self.slopes.at(x, carrier),
+            false => None,
+        };
+        let is_whole = |slope: Slope| {
+            let slope = slope.of_whole(self.solved.model, &self.shared.intact);
+            slope.into_owned()
+        };
         Some(Sample {
             displacement,
-            carrier: self.sampler.carrier(x)?,
+            carrier,
+            slope: slope.map(is_whole),
         })
     }
 
-    /// The gradients of the samples that points carry, in their order.
-    fn gradients_of_points<'s>(
-        &self,
-        samples: impl Iterator<Item = &'s Sample<D>>,
-    ) -> Vec<Tensor<D>> {
+    /// The gradients of the points that samples need, by their sites.
+    fn gradients_of_points(&self, samples: &[Option<Sample<D>>]) -> FxHashMap<usize, Tensor<D>> {
         let solved = self.solved;
-        let points = samples.filter_map(|sample| match sample.carrier {
-            Carrier::Point(site) => Some(solved.model.point_of(site)?.1 as u32),
-            Carrier::Element(..) => None,
-        });
-        let points: Vec<u32> = points.collect();
+        let mut sites: Vec<usize> = samples.iter().flatten().flat_map(Sample::points).collect();
+        sites.sort_unstable();
+        sites.dedup();
+        let point = |site: &usize| solved.model.point_of(*site).map_or(0, |(_, p)| p as u32);
+        let points: Vec<u32> = sites.iter().map(point).collect();
         let of_families = |own: &[u32]| {
             let gradient = |k: usize| solved.point_gradient(own[k] as usize, &self.shared.intact);
             let gradients = parallel::map(own.len(), 1, gradient);
@@ -91,34 +120,36 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
         };
         let numbers = (solved.model).of_families(self.ranks, &points, D * D, of_families);
         let tensors = numbers.chunks_exact(D * D);
-        tensors.map(Tensor::from_column_slice).collect()
+        sites
+            .into_iter()
+            .zip(tensors.map(Tensor::from_column_slice))
+            .collect()
     }
 
     /// The rows of a table along positions, with the columns of [`table_header`]; none for a position outside of the body. Collective where families are spread.
     pub fn rows(&self, positions: &[Vector<D>]) -> Vec<Vec<f64>> {
         let samples: Vec<Option<Sample<D>>> = parallel::map_slice(positions, |x| self.at(x));
-        let of_points = self.gradients_of_points(samples.iter().flatten());
-        let mut of_points = of_points.into_iter();
+        let of_points = self.gradients_of_points(&samples);
+        let of = |teller: Teller| match teller {
+            Teller::Element(c) => self.solved.element_gradient(c),
+            Teller::Point(site) => of_points[&site],
+        };
         let fields = Rows::new(self.solved, true);
-        let mut told = Vec::new();
         // a line may cross a slit: there is nothing to tell in it
-        for (x, sample) in positions.iter().zip(&samples) {
-            let Some(Sample {
-                displacement,
-                carrier,
-            }) = sample
-            else {
-                continue;
+        let places = positions.iter().zip(&samples);
+        let told: Vec<_> = places.filter_map(|(x, s)| Some((x, s.as_ref()?))).collect();
+        parallel::map_slice(&told, |(x, sample)| {
+            let slope = sample.slope.as_ref();
+            let gradients = match (slope, sample.carrier) {
+                (Some(slope), Carrier::Point(site)) => {
+                    Some([slope.value(of), of(Teller::Point(site))])
+                }
+                (Some(slope), Carrier::Element(..)) => Some([slope.value(of); 2]),
+                (None, Carrier::Point(site)) => Some([of(Teller::Point(site)); 2]),
+                (None, Carrier::Element(..)) => None,
             };
-            let gradient = match carrier {
-                Carrier::Point(_) => of_points.next(),
-                Carrier::Element(..) => None,
-            };
-            let here = (*carrier, *displacement);
-            told.push((x, here, gradient));
-        }
-        parallel::map_slice(&told, |(x, here, gradient)| {
-            let place = Place::of_position(self.solved, &self.shared, *here, *gradient);
+            let here = (sample.carrier, Some(sample.displacement));
+            let place = Place::of_position(self.solved, &self.shared, here, slope, gradients);
             let numbers = fields.at(Some(&place));
             x.iter().copied().chain(numbers).collect()
         })
@@ -132,12 +163,36 @@ impl<const D: usize> Solved<'_, D> {
     }
 
     pub(super) fn element_gradient(&self, c: usize) -> Tensor<D> {
-        fem::displacement_gradient_at_centre(&self.model.mesh, c, |n| self.node(n))
+        let mesh = &self.model.mesh;
+        let c = mesh.embedded.shown_by(c);
+        fem::displacement_gradient_at_centre(mesh, c, |n| self.node(n))
+    }
+
+    /// The displacement gradient of an element at its centre, or of a point.
+    pub(super) fn gradient_of(&self, teller: Teller, intact: &Intact) -> Tensor<D> {
+        match teller {
+            Teller::Element(c) => self.element_gradient(c),
+            Teller::Point(site) => match self.model.point_of(site) {
+                Some((_, p)) => self.point_gradient(p, intact),
+                None => Tensor::zeros(),
+            },
+        }
     }
 
     /// The displacement gradient at reference coordinates `xi` of an element.
     pub(super) fn gradient_in(&self, c: usize, xi: &[f64; 3]) -> Tensor<D> {
-        fem::superconvergent_gradient(&self.model.mesh, c, xi, |n| self.node(n))
+        let mesh = &self.model.mesh;
+        let shown = mesh.embedded.shown_by(c);
+        let mut at = *xi;
+        if shown != c {
+            // that of a cell of second order goes on beyond it
+            let x = fem::place_in(mesh, c, xi);
+            match fem::reference_of(mesh, shown, &x) {
+                Some(xi) => at = padded(&xi),
+                None => return self.element_gradient(shown),
+            }
+        }
+        fem::superconvergent_gradient(mesh, shown, &at, |n| self.node(n))
     }
 
     /// Least-squares gradient over the nearest bonds of a point that stand, weighted by 1/|ξ|²: sharper than over the whole family. Zero where they do not span the space.

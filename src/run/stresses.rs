@@ -83,12 +83,18 @@ impl<const D: usize> Solved<'_, D> {
         })
     }
 
-    /// Stress of an element at reference coordinates `xi`; the mean of the cell where its law is not linear, or its stress the partial stress of bonds.
-    pub(super) fn stress_in(&self, c: usize, xi: &[f64; 3], expansions: &Expansions) -> Stress<D> {
+    /// Stress of an element at reference coordinates `xi`, where the displacement has the gradient `known`, if that is known; the mean of the cell where its law is not linear, or its stress the partial stress of bonds.
+    pub(super) fn stress_in(
+        &self,
+        c: usize,
+        xi: &[f64; 3],
+        known: Option<Tensor<D>>,
+        expansions: &Expansions,
+    ) -> Stress<D> {
         let model = self.model;
         let x = fem::position_in(&model.mesh, c, xi);
         self.stress_of_element(c, x, expansions, || {
-            let gradient = self.gradient_in(c, xi);
+            let gradient = known.unwrap_or_else(|| self.gradient_in(c, xi));
             let thermal = |(thermal, t): (&Thermal<D>, f64)| thermal.gradient_in(model, c, xi, t);
             self.thermal().map_or(gradient, |at| gradient - thermal(at))
         })
@@ -123,10 +129,11 @@ impl<const D: usize> Solved<'_, D> {
         self.complete(tensor, None, material, &x)
     }
 
-    /// Stress of a point over the bonds of its family that stand: the Cauchy stress of exact bonds, of a nonlinear law and of one with memory, the linear stress of others.
+    /// Stress of a point over the bonds of its family that stand: the Cauchy stress of exact bonds, of a nonlinear law and of one with memory, the linear stress of others. These change by `beyond`, a change of the displacement gradient away from the point.
     pub(super) fn point_stress(
         &self,
         site: usize,
+        beyond: Option<Tensor<D>>,
         stands: impl Fn(usize, usize) -> bool,
         expansions: &Expansions,
     ) -> Stress<D> {
@@ -159,7 +166,14 @@ impl<const D: usize> Solved<'_, D> {
             let parts = thermal.parts(material, &x, t);
             expansions.stress(&parts, of)
         });
-        let tensor = of(u) - thermal.unwrap_or_else(Tensor::zeros);
+        let mut tensor = of(u) - thermal.unwrap_or_else(Tensor::zeros);
+        let law = model.peridynamics.as_ref().map(|p| &p.law);
+        if let (Some(beyond), Some(law)) = (beyond, law)
+            && thermal.is_none()
+            && body.cloud.material.is_empty()
+        {
+            tensor += law.linearised().tensor().contract(&beyond);
+        }
         self.complete(tensor, None, material, &x)
     }
 

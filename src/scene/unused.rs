@@ -112,8 +112,12 @@ impl<const D: usize> Parts<'_, D> {
         list
     }
 
-    /// A zone through which every bond reaches into the elements.
+    /// A zone through which every bond reaches into the elements, in a scene in which something may fail: a crack there has no room, while what stays whole is right in any width.
     fn narrow(&self, p: &Peridynamics<D>) -> Option<String> {
+        let mut materials = self.spec.materials.values();
+        if materials.all(|material| material.failure().is_empty()) {
+            return None;
+        }
         let mesh = &self.scene.mesh;
         let cells: Vec<usize> = (0..mesh.cell_count())
             .filter(|&c| self.scene.zones[c] == Zone::Nonlocal)
@@ -140,7 +144,7 @@ impl<const D: usize> Parts<'_, D> {
         })
     }
 
-    /// A zone that is drawn for the most part where the body is not.
+    /// A zone that is drawn for the most part where the body is not; one that is drawn through all of it is meant so.
     fn beyond(&self) -> Option<String> {
         let typed = self.spec.zones.nonlocal.as_ref()?;
         let region = super::region::region("zones.nonlocal", typed.get_ref(), &self.scene.mesh);
@@ -151,8 +155,12 @@ impl<const D: usize> Parts<'_, D> {
         let (least, most) = body_bounds(&self.scene.mesh);
         let a = (0..D).find(|&a| {
             let drawn = high[a] - low[a] + 2.0 * margin;
-            let within = (high[a] + margin).min(most[a]) - (low[a] - margin).max(least[a]);
-            drawn.is_finite() && within < 0.5 * drawn
+            let (from, to) = (
+                (low[a] - margin).max(least[a]),
+                (high[a] + margin).min(most[a]),
+            );
+            let is_through = to - from >= (most[a] - least[a]) * (1.0 - 1e-9);
+            drawn.is_finite() && !is_through && to - from < 0.5 * drawn
         })?;
         Some(format!(
             "`zones.nonlocal` reaches beyond the mesh: from {} to {} along {}, where the body reaches from {} to {}",

@@ -184,11 +184,18 @@ fn parts_that_touch_nothing_are_warned_of_by_name() {
 #[test]
 fn a_horizon_wider_than_the_zone_is_warned_of() {
     let small = "zones.nonlocal={box={min=[0.4,0.4],max=[0.5,0.5]}}";
-    let warned = told(PLATE, &[small]);
+    let fails = "materials.m.bond-based.fracture-energy=1";
+    let warned = told(PLATE, &[small, fails]);
     assert!(warned.contains("narrower than a horizon"), "{warned}");
+    // what stays whole is right in any width
+    let whole = told(PLATE, &[small]);
+    assert!(!whole.contains("narrower"), "{whole}");
     let outside = "zones.nonlocal={box={min=[0.4,0.4],max=[5,0.6]}}";
     let warned = told(PLATE, &[outside]);
     assert!(warned.contains("reaches beyond the mesh"), "{warned}");
+    let through = "zones.nonlocal={box={min=[0.4,-5],max=[0.6,5]}}";
+    let fine = told(PLATE, &[through]);
+    assert!(!fine.contains("beyond the mesh"), "{fine}");
     let fine = told(PLATE, &[]);
     assert!(
         !fine.contains("horizon wide") && !fine.contains("beyond the mesh"),

@@ -5,6 +5,7 @@ use bondline::progress::Silent;
 use bondline::run::AnyScene;
 use bondline::scene::Source;
 
+mod along_lines;
 mod fields;
 mod heated_bonds;
 mod heated_flow;

@@ -9,6 +9,7 @@ mod crack;
 mod hexahedra;
 mod meshes;
 mod quadrilaterals;
+mod second_order;
 mod shown;
 mod skin;
 mod structure;

@@ -235,7 +235,7 @@ fn facets_of(cells: &[u64], places: &[Vec<usize>]) -> Vec<Vec<u64>> {
         .collect()
 }
 
-/// The mesh with a node in the middle of each side of its quadrilaterals and their facets; inner ones lie beside the middle by up to `reach` of the side.
+/// The mesh with a node in the middle of each side of its cells and facets; in the plane inner ones lie beside the middle by up to `reach` of the side.
 pub fn raised(mesh: MeshParts, reach: f64, random: &mut Random) -> MeshParts {
     let outer: Vec<[u64; 2]> = (mesh.blocks[0].1.chunks_exact(2))
         .map(|side| [side[0].min(side[1]), side[0].max(side[1])])
@@ -244,16 +244,12 @@ pub fn raised(mesh: MeshParts, reach: f64, random: &mut Random) -> MeshParts {
     let mut middle: BTreeMap<[u64; 2], u64> = BTreeMap::new();
     let mut blocks = Vec::new();
     for (shape, nodes) in &mesh.blocks {
-        let (count, raised) = match shape {
-            CellShape::Line2 => (2, CellShape::Line3),
-            CellShape::Quad4 => (4, CellShape::Quad8),
-            other => panic!("a mesh of {other:?}"),
-        };
+        let raised = shape.quadratic();
         let mut all = Vec::new();
-        for cell in nodes.chunks_exact(count) {
+        for cell in nodes.chunks_exact(shape.node_count()) {
             all.extend(cell);
-            for k in 0..if count == 2 { 1 } else { count } {
-                let (p, q) = (cell[k], cell[(k + 1) % count]);
+            for &[p, q] in raised.mid_sides() {
+                let (p, q) = (cell[p], cell[q]);
                 let ends = [p.min(q), p.max(q)];
                 all.push(*middle.entry(ends).or_insert_with(|| {
                     let [a, b] = ends.map(|n| points[n as usize]);
@@ -263,7 +259,7 @@ pub fn raised(mesh: MeshParts, reach: f64, random: &mut Random) -> MeshParts {
                     points.push([
                         0.5 * (a[0] + b[0]) + s * dx - t * dy,
                         0.5 * (a[1] + b[1]) + s * dy + t * dx,
-                        0.0,
+                        0.5 * (a[2] + b[2]),
                     ]);
                     points.len() as u64 - 1
                 }));

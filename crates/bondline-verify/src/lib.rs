@@ -26,6 +26,7 @@
 //! | `scale` | static solves of up to a million unknowns: iterations, time, memory |
 //! | `bobaru` | the tables of \[Bobaru2009\] |
 //! | `meshes` | scenes as people type them, on meshes that fit nothing |
+//! | `warned` | warnings of scenes that are drawn, beside their errors |
 //! | `zones` | zones that are drawn, on such meshes |
 //! | `quadratic` | cells of second order: affine fields, orders, known solutions |
 //! | `estimates` | the estimates of [SAND2015-7998] chapters 2 and 3, and the ghost strain of figure 2.1 |
@@ -74,6 +75,7 @@ pub mod tangents;
 pub mod truncated;
 pub mod typed;
 pub mod variable_horizon;
+pub mod warned;
 pub mod wave;
 pub mod weights;
 pub mod zones;
@@ -253,6 +255,11 @@ pub const SUITES: &[Suite] = &[
         name: "zones",
         about: "zones drawn by seeds on such meshes: affine fields, steps in time, loads and supports across them",
         run: zones::run,
+    },
+    Suite {
+        name: "warnings",
+        about: "scenes drawn by a seed: what is wrong with their results, beside what they were told",
+        run: warned::run,
     },
     Suite {
         name: "quadratic",

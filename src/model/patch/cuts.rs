@@ -178,6 +178,8 @@ fn parts<const D: usize>(
 fn may_be_cut<const D: usize>(mesh: &Mesh<D>, c: usize) -> bool {
     match mesh.shapes[c] {
         CellShape::Line2 | CellShape::Tri3 | CellShape::Tet4 => true,
+        // their sides are straight
+        CellShape::Line3 | CellShape::Tri6 | CellShape::Tet10 => true,
         CellShape::Quad4 | CellShape::Hex8 => match mesh.embedded.is_divided(c) {
             true => fem::may_be_divided(mesh, c),
             false => has_constant_jacobian(mesh, c),

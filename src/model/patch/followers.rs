@@ -6,9 +6,9 @@ use super::{
     cells::{GOOD, Index, PatchCells, block},
     cuts::Cuts,
     error::PatchError,
-    rows::{Place, Row, Rows, gathered},
+    rows::{Place, Row, Rows, affine_row, gathered, row_of_cell},
 };
-use crate::{fem, mesh::Mesh, tensor::Vector};
+use crate::{mesh::Mesh, tensor::Vector};
 
 /// Rings of cells around a node in which an element is sought.
 const RINGS: usize = 12;
@@ -17,12 +17,12 @@ const RINGS: usize = 12;
 const PASSES: usize = 200;
 
 /// The nodes of the mesh that follow, with those of the element that each follows: the one of the least sum of weights in the first ring of cells that has any, and in the next. It is of the `material` of what is left of their own, whose
-/// strain another one has not.
+/// strain another one has not. Where nodes need masses (`has_masses`), weights are those of the corners.
 pub(super) fn of_mesh<const D: usize>(
     mesh: &Mesh<D>,
     cuts: &Cuts,
-    is_held: &dyn Fn(u32) -> bool,
-    material: &dyn Fn(u32) -> u16,
+    (is_held, material): (&dyn Fn(u32) -> bool, &dyn Fn(u32) -> u16),
+    has_masses: bool,
 ) -> Result<Rows<D>, PatchError> {
     let (offsets, around) = mesh.node_cells();
     let cells = |n: u32| &around[offsets[n as usize] as usize..offsets[n as usize + 1] as usize];
@@ -49,12 +49,11 @@ pub(super) fn of_mesh<const D: usize>(
             ring.sort_unstable();
             ring.dedup();
             for &c in ring.iter().filter(|&&c| may_lead(c)) {
-                let Some(xi) = fem::reference_of(mesh, c as usize, &x) else {
-                    continue;
+                let row = match has_masses {
+                    true => affine_row(mesh, c as usize, &x),
+                    false => row_of_cell(mesh, c as usize, &x),
                 };
-                let (shape, _) = fem::shape_values(mesh, c as usize, &xi);
-                let nodes = mesh.cell(c as usize).iter().map(|&n| Place::Mesh(n));
-                let row: Row<D> = nodes.zip(shape).collect();
+                let Some(row) = row else { continue };
                 let sum: f64 = row.iter().map(|e| e.1.abs()).sum();
                 if best.as_ref().is_none_or(|b| sum < b.0) {
                     best = Some((sum, row));

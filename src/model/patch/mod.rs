@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `places.rs` | places that a scene wants, holds, and keeps a patch off |
 //! | `cells.rs` | cells of the zone, the rim around them, and the faces Γ of the rim |
-//! | `replaced.rs` | cells of second order that the patch meets, linear with straight sides; quadrilaterals and hexahedra that it cuts, divided |
+//! | `replaced.rs` | cells of second order that the patch meets, with straight sides, and linear but for simplices at rest; quadrilaterals and hexahedra that it cuts, divided |
 //! | `cuts.rs` | elements that Γ cuts: what is left of them |
 //! | `plane_parts.rs` | plane parts of Γ, in an order in which rows of their nodes resolve |
 //! | `tie.rs` | the displacement of the nodes of Γ, by a dual mortar |
@@ -14,6 +14,7 @@
 //! | `left.rs` | what is left of cut cells, as simplices |
 //! | `surface.rs` | facets at the surface of the body that the patch covers |
 //! | `moments.rs`, `rows.rs`, `error.rs` | shared: moments of parts, rows of nodes that follow, errors |
+//! | `shown.rs` | cells that show the strain of another |
 //! | `composite.rs` | zone, rim and what is left of the elements as one mesh |
 //!
 //! The peridynamic zone is a union of lattice cells. Around it lies a *rim* of elements on the same lattice, so that a coupling sees a seam that follows the lattice, whatever the mesh is. The elements of the mesh end at Γ, the outer face of the rim:
@@ -39,6 +40,7 @@ mod plane_parts;
 mod replaced;
 mod rows;
 mod shares;
+mod shown;
 mod sides;
 mod surface;
 mod tie;
@@ -163,7 +165,7 @@ fn grown<const D: usize>(
     for _ in 0..ABSORBED {
         patch.check_materials(material)?;
         patch.check_connected(mesh)?;
-        let (cut, replaced) = replaced::replaced(mesh, &patch);
+        let (cut, replaced) = replaced::replaced(mesh, &patch, lattice.has_masses);
         let cuts = Cuts::new(cut.as_ref(), &patch, lattice.has_masses)?;
         let strips = match growth.takes_strips {
             true => cuts.strips(cut.as_ref(), &patch, is_held),
@@ -205,7 +207,7 @@ fn embedded<const D: usize>(
     }
     let sides = Sides::new(mesh, patch, cuts);
     let is_held = |n: u32| is_held(sides.origin(n));
-    let mut rows = followers::of_mesh(&sides.mesh, cuts, &is_held, material)?;
+    let mut rows = followers::of_mesh(&sides.mesh, cuts, (&is_held, material), lattice.has_masses)?;
     rows.extend(followers::of_rim(patch)?);
     let tied = tie::rows(&sides.mesh, patch, cuts);
     let mut all = rows.clone();
@@ -217,6 +219,9 @@ fn embedded<const D: usize>(
     let mut composite = Composite::new((mesh, &sides), patch, cuts);
     let all = followers::resolved(&all, patch)?;
     composite.patched.mesh.embedded.followers = composite.numbered(&all);
+    let origin = &composite.patched.origin;
+    let of_cell = |c: u32| material(origin[c as usize]);
+    composite.patched.mesh.embedded.shown = shown::shown(&composite.patched, of_cell);
     composite.patched.skin = patch.skin;
     composite.patched.kept_off = patch.kept_off;
     share_masses(
@@ -293,7 +298,7 @@ fn volumes<const D: usize>(patched: &Patched<D>) -> Vec<f64> {
     fem::nodal_volumes(&patched.mesh, elements)
 }
 
-/// A node of elements that follows none and has no larger volume than that part of a cell, if there is one, where nodes that follow hand theirs on by these rows.
+/// A node of elements that follows none and has no larger volume than that part of a cell of the patch, and of the smallest element around it, if there is one, where nodes that follow hand theirs on by these rows.
 fn lightest<const D: usize>(
     patched: &Patched<D>,
     mut volume: Vec<f64>,
@@ -305,11 +310,22 @@ fn lightest<const D: usize>(
         let own = std::mem::take(&mut volume[n as usize]);
         row.iter().for_each(|&(m, w)| volume[m as usize] += w * own);
     }
-    let elements = (0..mesh.cell_count()).filter(|&c| !patched.nonlocal[c]);
-    let follows = |n: &u32| mesh.embedded.followers.contains_key(n);
-    let free = elements.flat_map(|c| mesh.cell(c)).filter(|n| !follows(n));
-    let least = free.min_by(|&&a, &&b| volume[a as usize].total_cmp(&volume[b as usize]))?;
-    let own = volume[*least as usize];
     let cell = mesh.embedded.covered.edge.powi(D as i32);
-    (own <= light * cell).then_some((*least, own))
+    // nodes of elements that are small whatever is cut off are light by themselves
+    let mut smallest = vec![cell; mesh.nodes.len()];
+    let elements = || (0..mesh.cell_count()).filter(|&c| !patched.nonlocal[c]);
+    for c in elements() {
+        let whole = mesh.cell_volume(c).abs();
+        for &n in mesh.cell(c) {
+            let own = &mut smallest[n as usize];
+            *own = own.min(whole);
+        }
+    }
+    let part = |n: u32| volume[n as usize] / smallest[n as usize];
+    let follows = |n: &u32| mesh.embedded.followers.contains_key(n);
+    let free = elements()
+        .flat_map(|c| mesh.cell(c))
+        .filter(|n| !follows(n));
+    let least = *free.min_by(|&&a, &&b| part(a).total_cmp(&part(b)))?;
+    (part(least) <= light).then_some((least, volume[least as usize]))
 }

@@ -1,6 +1,7 @@
-//! Cells that a patch replaces before it cuts: those of second order that it meets by linear ones with straight sides, and quadrilaterals and hexahedra by divided ones.
+//! Cells that a patch replaces before it cuts: those of second order that it meets by ones with straight sides, and quadrilaterals and hexahedra by divided ones.
 //!
-//! The shape functions of general quadrilaterals and hexahedra are no polynomials in space. Divided about their middle they are linear in each part ([`crate::fem`], `divided.rs`), and neighbours that are whole stay as they are.
+//! Simplices with straight sides have polynomials for shape functions, so that the moments of what is left of them give their stiffness. They keep their order at rest; a body that moves needs a positive mass at each node, which linear cells have
+//! whatever is cut off. Other cells of second order become linear. The shape functions of general quadrilaterals and hexahedra are no polynomials in space. Divided about their middle they are linear in each part ([`crate::fem`], `divided.rs`), and neighbours that are whole stay as they are.
 
 use std::borrow::Cow;
 
@@ -21,16 +22,17 @@ pub struct Replaced {
     pub divided: usize,
 }
 
-/// The mesh with what replaces cells that the patch meets; its nodes and cells keep their numbers.
+/// The mesh with what replaces cells that the patch meets; its nodes and cells keep their numbers. `has_masses` if every node needs a mass.
 pub(super) fn replaced<'m, const D: usize>(
     mesh: &'m Mesh<D>,
     patch: &PatchCells<D>,
+    has_masses: bool,
 ) -> (Cow<'m, Mesh<D>>, Replaced) {
     let mut found = Replaced::default();
     let mut mesh = Cow::Borrowed(mesh);
     let met = met(&mesh, patch);
     if mesh.has_quadratic_cells() {
-        straighten(mesh.to_mut(), &met, &mut found);
+        straighten(mesh.to_mut(), &met, has_masses, &mut found);
     }
     let divided = to_divide(&mesh, &met);
     if !divided.is_empty() {
@@ -70,13 +72,17 @@ fn met<const D: usize>(mesh: &Mesh<D>, patch: &PatchCells<D>) -> Vec<Option<Met>
     met
 }
 
-/// Makes linear cells, of straight sides, of those of second order that the patch meets.
-fn straighten<const D: usize>(mesh: &mut Mesh<D>, met: &[Option<Met>], found: &mut Replaced) {
+/// Gives straight sides to cells of second order that the patch meets, and makes linear ones of those whose order is not kept.
+fn straighten<const D: usize>(
+    mesh: &mut Mesh<D>,
+    met: &[Option<Met>],
+    has_masses: bool,
+    found: &mut Replaced,
+) {
     let is_met: Vec<bool> = (0..mesh.cell_count())
         .map(|c| met[c].is_some() && mesh.shapes[c].is_quadratic())
         .collect();
     for c in (0..is_met.len()).filter(|&c| is_met[c]) {
-        found.linear += 1;
         // cells of second order beside it share the sides
         let sides: Vec<_> = mesh.mid_sides(c).collect();
         for side in sides {
@@ -87,7 +93,12 @@ fn straighten<const D: usize>(mesh: &mut Mesh<D>, met: &[Option<Met>], found: &m
             *x = middle;
         }
     }
-    mesh.linearise(|c| is_met[c]);
+    let is_simplex = |shape| matches!(shape, CellShape::Line3 | CellShape::Tri6 | CellShape::Tet10);
+    let is_linear: Vec<bool> = (is_met.iter().zip(&mesh.shapes))
+        .map(|(is_met, &shape)| *is_met && (has_masses || !is_simplex(shape)))
+        .collect();
+    found.linear = is_linear.iter().filter(|c| **c).count();
+    mesh.linearise(|c| is_linear[c]);
 }
 
 /// Quadrilaterals and hexahedra to divide: all that the patch cuts or touches, if one of them is neither a parallelogram nor a parallelepiped. Cells that share a cut face have to have the same displacement there.

@@ -5,6 +5,11 @@ use std::collections::BTreeMap;
 use rustc_hash::FxHashMap;
 
 use super::cells::Index;
+use crate::{
+    fem,
+    mesh::Mesh,
+    tensor::{Vector, padded},
+};
 
 /// A node, of the mesh or of the patch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -33,4 +38,31 @@ pub(super) fn gathered<const D: usize>(row: impl IntoIterator<Item = (Place<D>, 
     let mut row: Row<D> = own.filter(|e| e.1.abs() > ROUNDING * largest).collect();
     row.sort_unstable_by_key(|e| e.0);
     row
+}
+
+/// The shape functions of a cell at a place, which may lie outside.
+pub(super) fn row_of_cell<const D: usize>(
+    mesh: &Mesh<D>,
+    c: usize,
+    x: &Vector<D>,
+) -> Option<Row<D>> {
+    let xi = fem::reference_of(mesh, c, x)?;
+    let (shape, _) = fem::shape_values(mesh, c, &xi);
+    let nodes = mesh.cell(c).iter().map(|&n| Place::Mesh(n));
+    Some(nodes.zip(shape).collect())
+}
+
+/// As [`row_of_cell`], of a cell of second order those of its corners alone: others are negative inside of it too, and no weights of masses.
+pub(super) fn affine_row<const D: usize>(
+    mesh: &Mesh<D>,
+    c: usize,
+    x: &Vector<D>,
+) -> Option<Row<D>> {
+    if !mesh.shapes[c].is_quadratic() {
+        return row_of_cell(mesh, c, x);
+    }
+    let xi = fem::reference_of(mesh, c, x)?;
+    let linear = fem::reference_cell(mesh.shapes[c].linear())?;
+    let nodes = mesh.corners(c).iter().map(|&n| Place::Mesh(n));
+    Some(nodes.zip((linear.values)(&padded(&xi))).collect())
 }

@@ -9,9 +9,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::{
     cells::{Index, PatchCells, block},
     cuts::Cuts,
-    rows::{Place, Row, Rows},
+    rows::{Place, Row, Rows, affine_row},
 };
-use crate::{fem, mesh::Mesh, peridynamics::bounded_least_norm::positive_weights, tensor::Vector};
+use crate::{mesh::Mesh, peridynamics::bounded_least_norm::positive_weights, tensor::Vector};
 
 /// Weight below which a row is extrapolated.
 const LEAST: f64 = -1e-9;
@@ -67,11 +67,9 @@ fn row_at<const D: usize>(
 ) -> Option<Found<D>> {
     let each = cells.iter().filter_map(|&c| {
         let c = c as usize;
-        let xi = fem::reference_of(mesh, c, x)?;
-        let (shape, count) = fem::shape_values(mesh, c, &xi);
-        let least = shape[..count].iter().copied().fold(1.0, f64::min);
-        let nodes = mesh.cell(c).iter().map(|&n| Place::Mesh(n));
-        Some((least, nodes.zip(shape).collect()))
+        let row = affine_row(mesh, c, x)?;
+        let least = row.iter().map(|e| e.1).fold(1.0, f64::min);
+        Some((least, row))
     });
     // the first of those that are alike
     each.reduce(|best, other| if other.0 > best.0 { other } else { best })

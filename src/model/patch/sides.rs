@@ -34,7 +34,7 @@ impl<const D: usize> Sides<D> {
     pub fn new(mesh: &Mesh<D>, patch: &PatchCells<D>, cuts: &Cuts) -> Self {
         let (offsets, around) = mesh.node_cells();
         let mut nodes: Vec<u32> = (cuts.cut())
-            .flat_map(|(c, _)| mesh.corners(c as usize))
+            .flat_map(|(c, _)| mesh.cell(c as usize))
             .copied()
             .filter(|&n| is_in(patch, &mesh.nodes[n as usize]))
             .collect();
@@ -44,7 +44,7 @@ impl<const D: usize> Sides<D> {
             let n = nodes[k] as usize;
             let cells = &around[offsets[n] as usize..offsets[n + 1] as usize];
             let left = cells.iter().copied().filter(|&c| !cuts.is_covered(c));
-            groups(mesh, patch, nodes[k], left.collect())
+            groups(mesh, patch, left.collect())
         });
         let mut sides = Self {
             mesh: mesh.clone(),
@@ -104,7 +104,6 @@ fn is_in<const D: usize>(patch: &PatchCells<D>, x: &Vector<D>) -> bool {
 fn groups<const D: usize>(
     mesh: &Mesh<D>,
     patch: &PatchCells<D>,
-    node: u32,
     mut rest: Vec<u32>,
 ) -> Vec<Vec<u32>> {
     let mut groups = Vec::new();
@@ -116,8 +115,7 @@ fn groups<const D: usize>(
             rest.retain(|&c| {
                 let shared = mesh.corners(c as usize).iter().copied();
                 let shared: Vec<u32> = shared.filter(|n| own.contains(n)).collect();
-                let is_beside =
-                    shared.len() >= D && shared.contains(&node) && is_left(mesh, patch, &shared);
+                let is_beside = shared.len() >= D && is_left(mesh, patch, &shared);
                 if is_beside {
                     group.push(c);
                 }

@@ -6,6 +6,7 @@ use crate::fem;
 use crate::model::{Carrier, Zone};
 use crate::peridynamics::PdBody;
 use crate::run::intact::Intact;
+use crate::run::slopes::{Slope, Teller};
 use crate::run::solution::Solved;
 use crate::run::stresses::{Expansions, Stress};
 use crate::tensor::{Tensor, Vector};
@@ -56,7 +57,11 @@ pub(in crate::run) struct Place<'a, const D: usize> {
     pub shared: &'a Shared,
     pub spot: Spot,
     displacement: Option<Vector<D>>,
+    /// Those that tell strain and stress between them, where not one alone does.
+    slope: Option<&'a Slope>,
     gradient: OnceCell<Tensor<D>>,
+    /// Displacement gradient of the carrier.
+    of_carrier: OnceCell<Tensor<D>>,
     stress: OnceCell<Stress<D>>,
 }
 
@@ -68,21 +73,27 @@ impl<'a, const D: usize> Place<'a, D> {
             shared,
             spot,
             displacement: None,
+            slope: None,
             gradient: OnceCell::new(),
+            of_carrier: OnceCell::new(),
             stress: OnceCell::new(),
         }
     }
 
-    /// A position with the displacement there; the gradient at a point may be known already.
+    /// A position with the displacement there, if that is of its sites; gradients where they are known already: that at the place, and that of its carrier.
     pub fn of_position(
         solved: &'a Solved<'a, D>,
         shared: &'a Shared,
-        (carrier, displacement): (Carrier, Vector<D>),
-        gradient: Option<Tensor<D>>,
+        (carrier, displacement): (Carrier, Option<Vector<D>>),
+        slope: Option<&'a Slope>,
+        gradients: Option<[Tensor<D>; 2]>,
     ) -> Self {
+        let known = |k: usize| gradients.map_or_else(OnceCell::new, |g| OnceCell::from(g[k]));
         Self {
-            displacement: Some(displacement),
-            gradient: gradient.map_or_else(OnceCell::new, OnceCell::from),
+            displacement,
+            slope,
+            gradient: known(0),
+            of_carrier: known(1),
             ..Self::new(solved, shared, carrier.into())
         }
     }
@@ -139,12 +150,17 @@ impl<'a, const D: usize> Place<'a, D> {
 
     /// Displacement gradient: of an element at its centre or at the place, of a point that of its nearest bonds.
     pub fn gradient(&self) -> Tensor<D> {
+        let of = |teller| self.solved.gradient_of(teller, &self.shared.intact);
         *self.gradient.get_or_init(|| match self.spot {
             Spot::Element(c) | Spot::Part(c, _) => self.solved.element_gradient(c),
-            Spot::InElement(c, xi) => self.solved.gradient_in(c, &xi),
-            Spot::Point(_) => self.point().map_or_else(Tensor::zeros, |(_, p)| {
-                self.solved.point_gradient(p, &self.shared.intact)
-            }),
+            Spot::InElement(c, xi) => match self.slope {
+                Some(slope) => slope.value(of),
+                None => self.solved.gradient_in(c, &xi),
+            },
+            Spot::Point(site) => match self.slope {
+                Some(slope) => slope.value(of),
+                None => of(Teller::Point(site)),
+            },
             Spot::Node { .. } => Tensor::zeros(),
         })
     }
@@ -156,9 +172,16 @@ impl<'a, const D: usize> Place<'a, D> {
             Spot::Element(c) | Spot::Part(c, _) => {
                 solved.cell_stress(c, &self.gradient(), expansions)
             }
-            Spot::InElement(c, xi) => solved.stress_in(c, &xi, expansions),
+            Spot::InElement(c, xi) => {
+                let slope = self.slope.map(|_| self.gradient());
+                solved.stress_in(c, &xi, slope, expansions)
+            }
             Spot::Point(site) => {
-                solved.point_stress(site, |p, j| intact.is_intact(p, j), expansions)
+                let own = || solved.gradient_of(Teller::Point(site), intact);
+                let beyond = self
+                    .slope
+                    .map(|_| self.gradient() - self.of_carrier.get_or_init(own));
+                solved.point_stress(site, beyond, |p, j| intact.is_intact(p, j), expansions)
             }
             Spot::Node { .. } => Stress::zero(),
         })

@@ -18,7 +18,7 @@ pub mod fracture;
 pub mod gmsh;
 pub mod loads;
 mod motion;
-mod order;
+pub(crate) mod order;
 pub mod scene;
 
 use super::{Effort, tell};

@@ -257,7 +257,7 @@ fn polar(n: usize, [inner, outer]: [f64; 2], turn: Turn) -> String {
 }
 
 /// An octant of a thick sphere: three blocks, one around each axis, that meet along (1, 1, 1).
-fn octant(n: usize, [inner, outer]: [f64; 2]) -> String {
+pub(crate) fn octant(n: usize, [inner, outer]: [f64; 2]) -> String {
     let radial = ((outer - inner) * n as f64).round() as usize;
     let across = (std::f64::consts::FRAC_PI_8 * (inner + outer) * n as f64).round() as usize;
     let mut mesh = Polar::default();

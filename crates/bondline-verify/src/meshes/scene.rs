@@ -104,11 +104,24 @@ pub fn history(
 /// # Errors
 /// The message of a refusal.
 pub fn files(text: &str, names: &[&str]) -> Result<Vec<Option<String>>, String> {
-    let folder = Folder::with(&[])?;
-    let scene = load(text, &[], &folder)?;
-    scene.run(&Silent).map_err(|e| e.to_string())?;
+    outputs(text, &[], &[], names).map(|found| found.1)
+}
+
+/// As [`files`], of a scene beside the `files` that it names, with its summary.
+///
+/// # Errors
+/// The message of a refusal.
+pub fn outputs(
+    text: &str,
+    overrides: &[&str],
+    files: &[(&str, &str)],
+    names: &[&str],
+) -> Result<(RunSummary, Vec<Option<String>>), String> {
+    let folder = Folder::with(files)?;
+    let scene = load(text, overrides, &folder)?;
+    let summary = scene.run(&Silent).map_err(|e| e.to_string())?;
     let read = |name: &&str| std::fs::read_to_string(folder.path().join("out").join(name)).ok();
-    Ok(names.iter().map(read).collect())
+    Ok((summary, names.iter().map(read).collect()))
 }
 
 /// Returns the prediction of `check` for a scene, without that of the error.

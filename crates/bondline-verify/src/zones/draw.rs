@@ -6,7 +6,7 @@ use crate::{meshes::affine::Family, tangents::Numbers};
 pub(super) const PLACES: [&str; 4] = ["inside", "at a side", "in a corner", "across"];
 
 /// Numbers that are drawn.
-pub(super) struct Draw(Numbers);
+pub(crate) struct Draw(Numbers);
 
 impl Draw {
     /// Numbers of a seed.

@@ -8,8 +8,8 @@
 //! | `obstacles.rs` | bodies whose notches, holes, corners, loads, supports and interfaces they cross |
 
 mod affine;
-mod draw;
-mod obstacles;
+pub(crate) mod draw;
+pub(crate) mod obstacles;
 mod steps;
 
 use super::{Effort, tell};

@@ -1,0 +1,95 @@
+//! Triangles and tetrahedra of second order that a rim cuts: at rest they keep their order, with straight sides.
+
+use bondline::{Material, Region, Silent};
+
+use super::meshes::{Body, Random, raised};
+use super::quadrilaterals::{assert_affine, told};
+use super::structure::{assert_symmetric_and_stiff, truncated};
+use super::{Drawn, scene, zone};
+
+fn affine_fields<const D: usize>(size: f64, edges: &[f64], radius: f64, seed: u64) {
+    let laws = [None, Some(0.2), Some(0.4)];
+    let shapes = [Drawn::Ball, Drawn::Box, Drawn::Polygon];
+    for (k, &edge) in edges.iter().enumerate() {
+        let body = Body::<D> {
+            size: [size; D],
+            edge,
+            seed: seed + k as u64,
+        };
+        let mut random = Random::new(body.seed);
+        let (nu, coupling) = (laws[k % 3], ["truncated", "splice"][k % 2]);
+        let material = nu.map_or(Material::bond_based(1.0), |nu| Material::lps(1.0, nu));
+        let pairwise = if D == 2 { 1.0 / 3.0 } else { 0.25 };
+        let scene = scene(&body, &mut random)
+            .mesh(raised(body.mesh(), 0.0, &mut random))
+            .nonlocal(zone(shapes[k % 3], &body, radius, &mut random))
+            .material("body", material)
+            .horizon(2.0)
+            .coupling(coupling);
+        let case = format!("{D}D {coupling} {nu:?} {edge}");
+        // of a splice no energy is printed
+        match coupling {
+            "truncated" => {
+                assert_affine::<D>(&case, &scene, (nu.unwrap_or(pairwise), body.volume()))
+            }
+            _ => {
+                let held = super::affine::held::<D>();
+                let solution = scene.condition("held", held).solve(&Silent).unwrap();
+                let off = super::affine::error(&solution, super::affine::field::<D>);
+                assert!(off < super::affine::LIMIT, "{case}: {off:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn affine_fields_are_exact() {
+    affine_fields::<2>(30.0, &[2.5, 1.3, 5.0, 3.1], 3.6, 1400);
+    affine_fields::<3>(13.0, &[2.6], 1.8, 1410);
+}
+
+#[test]
+fn the_stiffness_is_symmetric_and_has_no_mode_but_rigid_motions() {
+    let body = Body::<2> {
+        size: [12.0; 2],
+        edge: 2.1,
+        seed: 1420,
+    };
+    let scene = truncated(&body, Material::lps(1.0, 0.3), Drawn::Ball);
+    let scene = scene.mesh(raised(body.mesh(), 0.0, &mut Random::new(1421)));
+    assert_symmetric_and_stiff::<2>(&scene, "triangles of second order");
+}
+
+#[test]
+fn a_bar_two_tetrahedra_wide_bends_as_without_a_zone() {
+    let body = Body::<3> {
+        size: [16.0, 4.0, 4.0],
+        edge: 2.0,
+        seed: 1430,
+    };
+    let mut random = Random::new(body.seed);
+    let scene = scene(&body, &mut random)
+        .mesh(raised(body.mesh(), 0.0, &mut random))
+        .nonlocal(Region::ball([6.0, 2.0, 2.0], 0.9))
+        .material("body", Material::lps(1.0, 0.3))
+        .set("peridynamics.points.lattice.spacing", 0.5)
+        .horizon(1.0)
+        .set("conditions.held.displacement.on", "left")
+        .set("conditions.held.displacement.x", 0)
+        .set("conditions.held.displacement.y", 0)
+        .set("conditions.held.displacement.z", 0)
+        .set("conditions.weight.body-force.y", 1e-6);
+    let largest = |coupling: &str| {
+        let solution = scene.clone().coupling(coupling).solve(&Silent).unwrap();
+        let is_linear = told(&solution, "of second order are linear there");
+        assert!(!is_linear, "{coupling}");
+        let u = solution.displacement().unwrap();
+        u.iter().map(|u| u[1]).fold(0.0, f64::max)
+    };
+    let (elements, coupled) = (largest("local"), largest("truncated"));
+    // linear ones beside the rim made a bar of three across 5 % too stiff
+    assert!(
+        (coupled / elements - 1.0).abs() < 0.005,
+        "{coupled} {elements}"
+    );
+}
