@@ -114,6 +114,24 @@ impl<'m, const D: usize> Slopes<'m, D> {
 
     /// The slope at `x`; none in an element of second order, whose own strain is linear.
     pub fn at(&self, x: &Vector<D>, carrier: Carrier) -> Option<Slope> {
+        let embedded = &self.model.mesh.embedded;
+        let is_best = match carrier {
+            Carrier::Point(_) => true,
+            Carrier::Element(c, _) => {
+                let shape = self.model.mesh.shapes[c];
+                let is_simplex = matches!(shape, CellShape::Tri3 | CellShape::Tet4);
+                embedded.has_strain(c) && !is_simplex
+            }
+        };
+        self.fit(x, carrier, is_best)
+    }
+
+    /// As [`Slopes::at`], at the centre of an element, whose own strain is one of many.
+    pub fn evened_out(&self, c: usize) -> Option<Slope> {
+        self.fit(&self.centre(c), Carrier::Element(c, [0.0; 3]), false)
+    }
+
+    fn fit(&self, x: &Vector<D>, carrier: Carrier, is_best: bool) -> Option<Slope> {
         let mesh = &self.model.mesh;
         let (own, around) = match carrier {
             Carrier::Element(c, _) => match mesh.embedded.shown_by(c) {
@@ -123,13 +141,6 @@ impl<'m, const D: usize> Slopes<'m, D> {
             Carrier::Point(site) => (Teller::Point(site), self.around_point(site)),
         };
         let centre = self.position(own);
-        let is_best = match carrier {
-            Carrier::Point(_) => true,
-            Carrier::Element(c, _) => {
-                let is_simplex = matches!(mesh.shapes[c], CellShape::Tri3 | CellShape::Tet4);
-                mesh.embedded.has_strain(c) && !is_simplex
-            }
-        };
         let arms: Vec<Vector<D>> = around.iter().map(|k| self.position(*k) - centre).collect();
         let weights = weights(&(x - centre), &arms, is_best);
         let own_weight = 1.0 - weights.iter().sum::<f64>();

@@ -9,7 +9,7 @@ use crate::system::Ranks;
 use crate::tensor::{Tensor, Tensor4, Vector, inverse, strain};
 use crate::{
     fem,
-    model::{Carrier, Model, SiteKind},
+    model::{Model, SiteKind},
     parallel,
 };
 
@@ -199,7 +199,7 @@ fn peak_at_seam<const D: usize>(
         return None;
     }
     let u = |p: usize| cloud.transfer.displacement(p, asked.displacement);
-    let slope = Slopes::new(model).at(&place, Carrier::Element(cell, [0.0; 3]))?;
+    let slope = Slopes::new(model).evened_out(cell)?;
     let points = slope.tellers().filter_map(|teller| match teller {
         Teller::Element(_) => None,
         Teller::Point(site) => model.point_of(site).map(|(_, p)| p as u32),
