@@ -102,17 +102,7 @@ fn drawn<const D: usize>(draw: &mut Draw, body: &Body, nodes: &[[f64; 3]], numbe
     let spacing = body.family.size * draw.within(0.5, 1.0);
     let middle = &draw.one(nodes)[..D];
     let radius = spacing * draw.within(3.0, if D == 3 { 4.0 } else { 7.0 });
-    let zone = match draw.one(&[true, false]) {
-        true => format!("ball = {{ center = {middle:?}, radius = {radius} }}"),
-        false => {
-            let mut at = |by: f64| -> Vec<f64> {
-                let each = middle.iter();
-                each.map(|x| x + by * radius * draw.within(0.7, 1.2))
-                    .collect()
-            };
-            format!("box = {{ min = {:?}, max = {:?} }}", at(-1.0), at(1.0))
-        }
-    };
+    let zone = draw.ball_or_box(middle, radius);
     // every other scene leaves the coupling out
     let coupling = match draw.one(&[true, false]) {
         true => None,

@@ -118,7 +118,7 @@ impl Run {
         }
     }
 
-    /// What it was told.
+    /// Its warnings.
     pub fn told(&self) -> Option<Told> {
         match self {
             Self::Done { told, .. } => Some(*told),

@@ -24,6 +24,19 @@ impl Draw {
         let k = self.within(0.0, list.len() as f64) as usize;
         list[k.min(list.len() - 1)]
     }
+
+    /// A ball, or a box of about its size, as it is typed.
+    pub fn ball_or_box(&mut self, middle: &[f64], radius: f64) -> String {
+        if self.one(&[true, false]) {
+            return format!("ball = {{ center = {middle:?}, radius = {radius} }}");
+        }
+        let mut at = |by: f64| -> Vec<f64> {
+            let each = middle.iter();
+            each.map(|x| x + by * radius * self.within(0.7, 1.2))
+                .collect()
+        };
+        format!("box = {{ min = {:?}, max = {:?} }}", at(-1.0), at(1.0))
+    }
 }
 
 /// Draws the zone of a scene, as it is typed.

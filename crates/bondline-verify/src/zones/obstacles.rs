@@ -164,17 +164,7 @@ fn drawn<const D: usize>(
     let middle = &draw.one(nodes)[..D];
     let origin: Vec<f64> = (0..D).map(|_| spacing * draw.within(0.0, 1.0)).collect();
     let radius = spacing * draw.within(3.0, if D == 3 { 4.0 } else { 6.0 });
-    let zone = match draw.one(&[true, false]) {
-        true => format!("ball = {{ center = {middle:?}, radius = {radius} }}"),
-        false => {
-            let mut at = |by: f64| -> Vec<f64> {
-                let each = middle.iter();
-                each.map(|x| x + by * radius * draw.within(0.7, 1.2))
-                    .collect()
-            };
-            format!("box = {{ min = {:?}, max = {:?} }}", at(-1.0), at(1.0))
-        }
-    };
+    let zone = draw.ball_or_box(middle, radius);
     let more = format!(
         "peridynamics = {{ horizon = {}, points.lattice = {{ spacing = {spacing}, origin = {origin:?} }} }}\nzones.nonlocal.{zone}\n",
         3.0 * spacing,
