@@ -59,7 +59,6 @@ MOTION = """
 duration = {duration}
 outputs = 1
 history-interval = {duration}
-growing-modes = "warn"
 
 [initial.hump.displacement]
 x = "0.01 * exp(-((x - 8) / 4)^2)"

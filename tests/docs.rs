@@ -286,8 +286,11 @@ fn the_reference_names_every_key_of_the_schema() {
             later && is_named(&format!("{stem}-2"))
         })
     };
+    // codes of warnings have a page of their own
+    let is_code = |word: &str| word.parse::<bondline::observe::warning::Code>().is_ok();
     let missing: Vec<&String> = known
         .iter()
+        .filter(|word| !is_code(word))
         .filter(|word| !is_named(word) && !is_between(word))
         .collect();
     assert!(missing.is_empty(), "not in docs/scene.md: {missing:?}");

@@ -384,7 +384,12 @@ y = 1e-3
             source.push_override(o)?;
         }
         let scene = AnyScene::from_source(&source, std::path::Path::new(""), "plate")?;
-        Ok(scene.solve(&Silent).unwrap().summary().warnings.join("\n"))
+        let solution = scene.solve(&Silent).unwrap();
+        let warnings = solution.summary().warnings.iter();
+        Ok(warnings
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join("\n"))
     };
     let skin = "zones.skin=free-surfaces";
     let inside = "cracks.c.segment={from=[0.3,0.25],to=[0.5,0.25]}";
@@ -465,7 +470,8 @@ probes.tip = {{ at = [10, 1] }}
     let (names, row) = table.split_once('\n').unwrap();
     let column = names.split(',').position(|n| n == "uy").unwrap();
     let tip = row.trim().split(',').nth(column).unwrap().parse().unwrap();
-    (tip, summary.warnings)
+    let warnings = summary.warnings.into_iter();
+    (tip, warnings.map(|warning| warning.message).collect())
 }
 
 #[test]

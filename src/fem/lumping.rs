@@ -22,7 +22,8 @@ pub fn nodal_volumes<const D: usize>(
 
 /// Hands the share of each node of cell `c` in its volume to `add`, perhaps in pieces, as a fraction of a volume \[m^D\]: `∫ N_a dV` of a linear cell.
 ///
-/// Those integrals are zero or negative at corners of cells of second order. Their shares are in the ratio of the diagonal of the consistent mass, `∫ N_a² dV / Σ_b ∫ N_b² dV` of the volume: positive, and of the same sum.
+/// Those integrals are zero or negative at corners of cells of second order. Their shares are in the ratio of the diagonal of the consistent mass, `∫ N_a² dV / Σ_b ∫ N_b² dV` of the volume: positive, and of the same sum. Of a simplex
+/// of which a part is left see [`share_parts`].
 ///
 /// Source: \[HintonRockZienkiewicz1976\].
 pub fn for_each_share<const D: usize>(
@@ -39,6 +40,10 @@ pub fn for_each_share<const D: usize>(
         });
         return;
     }
+    if mesh.embedded.cut_cell(c).is_some() {
+        share_parts(mesh, c, add);
+        return;
+    }
     let (mut volume, mut squares) = (0.0, [0.0; MAX_NODES]);
     for_each_point(mesh, c, Rule::Mass, |p| {
         volume += p.weight;
@@ -49,6 +54,40 @@ pub fn for_each_share<const D: usize>(
     let total: f64 = squares.iter().sum();
     for (&n, square) in nodes.iter().zip(&squares) {
         add(n, square / total, volume);
+    }
+}
+
+/// As [`for_each_share`], of the part that is left of a simplex of second order.
+///
+/// Corners begin with the integrals `∫ λ_a dV` of linear shape functions over the part, which are positive, and have its first moment. The node in the middle of an edge takes as much from both ends, so that this moment stays: of the
+/// smaller integral the part that it takes in a whole cell, where these shares are those of the diagonal mass.
+fn share_parts<const D: usize>(mesh: &Mesh<D>, c: usize, mut add: impl FnMut(u32, f64, f64)) {
+    let sides = mesh.shapes[c].mid_sides();
+    let nodes = mesh.cell(c);
+    let corners = nodes.len() - sides.len();
+    let (mut volume, mut linear) = (0.0, [0.0; MAX_NODES]);
+    for_each_point(mesh, c, Rule::Mass, |p| {
+        volume += p.weight;
+        for (integral, shape) in linear.iter_mut().zip(&p.shape[..corners]) {
+            *integral += shape * p.weight;
+        }
+        // λ_a = N_a + ½ Σ N_m over the edges of a corner
+        for (ends, shape) in sides.iter().zip(&p.shape[corners..]) {
+            ends.iter()
+                .for_each(|&a| linear[a] += 0.5 * shape * p.weight);
+        }
+    });
+    // (D + 1)/2 of the share of the middle of an edge
+    let taken = [2.0 / 3.0, 8.0 / 19.0, 8.0 / 27.0][D - 1];
+    let mut shares = linear;
+    for (k, &[a, b]) in sides.iter().enumerate() {
+        let part = taken * linear[a].min(linear[b]);
+        shares[a] -= part;
+        shares[b] -= part;
+        shares[corners + k] = 2.0 * part;
+    }
+    for (&n, share) in nodes.iter().zip(&shares) {
+        add(n, share / volume, volume);
     }
 }
 
@@ -121,6 +160,46 @@ mod tests {
         close(shares::<3>(CellShape::Tet10), (1.0 / 36.0, 4.0 / 27.0));
         let (corner, side) = shares::<3>(CellShape::Hex20);
         assert!(corner > 0.0 && (8.0 * corner + 12.0 * side - 1.0).abs() < 1e-14);
+    }
+
+    /// Shares of the part of a simplex within some distance of its first corner, of its longest edge: positive, of the part's mass and first moment, and of all of it those of a whole cell.
+    fn shares_of_a_part<const D: usize>(shape: CellShape) {
+        let mesh = unit_box::<D>(shape, 1, 0.0);
+        let whole = super::super::cell_volume(&mesh, 0).abs();
+        let corner = |k: usize| mesh.nodes[mesh.cell(0)[k] as usize];
+        let own: Vec<f64> = nodal_volumes(&mesh, std::iter::once(0));
+        for part in [1.0, 0.7, 0.4] {
+            // a similar simplex: centroid and second moment about it shrink alike
+            let mean = (0..=D).map(corner).sum::<Vector<D>>() / (D + 1) as f64;
+            let spread = |k: usize| (corner(k) - mean) * (corner(k) - mean).transpose();
+            let second = (0..=D).map(spread).sum::<crate::tensor::Tensor<D>>();
+            let second = second / ((D + 1) * (D + 2)) as f64 * (part * part);
+            let centroid = corner(0) + (mean - corner(0)) * part;
+            let size = whole * part.powi(D as i32);
+            let rule = super::super::rule_of_parts(&mesh, 0, &[(size, centroid, second)]).unwrap();
+            let mut cut = mesh.clone();
+            cut.embedded.cut.insert(0, rule);
+            let (mut mass, mut moment) = (0.0, Vector::<D>::zeros());
+            for_each_share(&cut, 0, |n, share, volume| {
+                assert!(share > 0.01, "{shape:?} {part} {share}");
+                mass += share * volume;
+                moment += mesh.nodes[n as usize] * (share * volume);
+                let is_whole = part == 1.0;
+                assert!(!is_whole || (share * volume - own[n as usize]).abs() < 1e-14);
+            });
+            assert!((mass - size).abs() < 1e-14, "{shape:?} {part}");
+            assert!(
+                (moment / mass - centroid).norm() < 1e-14,
+                "{shape:?} {part}"
+            );
+        }
+    }
+
+    #[test]
+    fn shares_of_a_part_of_a_simplex_have_its_mass_and_first_moment() {
+        shares_of_a_part::<1>(CellShape::Line3);
+        shares_of_a_part::<2>(CellShape::Tri6);
+        shares_of_a_part::<3>(CellShape::Tet10);
     }
 
     fn forces_of_a_body<const D: usize>() {

@@ -14,6 +14,7 @@
 //! | `cracks.rs` | energy and area of broken bonds, in a summary |
 //! | `provenance.rs` | program, scene, machine and times of a run, in a file beside its outputs |
 //! | `proof.rs` | results of the checks of a model before it is solved |
+//! | `warning.rs` | doubts about a model or its solution |
 //! | `rezoning_event.rs` | changes of the nonlocal zone during a run |
 //! | `observer.rs` | results handed to the program that started a run |
 //! | `atomic_file.rs` | whole files or none: written beside, then renamed |
@@ -34,6 +35,7 @@ pub mod rezoning_event;
 pub mod series;
 pub mod summary;
 pub mod vtu;
+pub mod warning;
 
 pub use observer::Observer;
 

@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::cracks::CrackSummary;
 use super::report::{components, grouped, number};
 use super::rezoning_event::{self, Switch};
+use super::warning::{Code, Quantity, Warning};
 use crate::system::Traffic;
 
 /// Reason why a run in time ended.
@@ -48,7 +49,7 @@ pub struct EnergyGain {
 
 impl EnergyGain {
     /// Returns the warning of a summary, from 1 % on.
-    pub fn warning(&self) -> Option<String> {
+    pub fn warning(&self) -> Option<Warning> {
         let (step, time) = self.first_told?;
         let cause = match self.by_law {
             true => {
@@ -58,13 +59,13 @@ impl EnergyGain {
                 "the stiffness is not symmetric, and the seam feeds its modes; results from there on are not to be trusted: make the run shorter, or use coupling.truncated"
             }
         };
-        Some(format!(
+        Some(Warning::new(Code::EnergyGain, format!(
             "the motion gained {:.1} % of its largest energy without work by step {}, t = {} (1 % at step {step}, t = {}): {cause}",
             100.0 * self.largest,
             self.step,
             number(self.time),
             number(time)
-        ))
+        )).of(Quantity::Energy, self.largest))
     }
 }
 
@@ -89,7 +90,7 @@ pub struct Rotation {
 
 impl Rotation {
     /// Returns the warning of a summary.
-    pub fn warning(&self) -> String {
+    pub fn warning(&self) -> Warning {
         let when = self.when.map_or_else(String::new, |(step, time)| {
             format!(" at step {step}, t = {}", number(time))
         });
@@ -108,13 +109,13 @@ impl Rotation {
                 .to_owned(),
             None => String::new(),
         };
-        format!(
+        Warning::new(Code::Rotation, format!(
             "the body at ({}) has rotated by {:.1} degrees{when}: what is for small rotations there, elements or points, is {} % too large, and its stress, linear, has turned to first order only, off by that part of its stiffness{failure}{energy}; where that matters use {}",
             components(&self.place),
             self.degrees,
             number(100.0 * self.length_error),
             self.remedy
-        )
+        )).of(Quantity::Displacement, self.length_error).at(self.place.as_slice())
     }
 }
 
@@ -213,6 +214,17 @@ pub struct MotionSummary {
 }
 
 impl MotionSummary {
+    /// Returns the warning of damage at the edge of the zone, if there is any.
+    pub fn edge_warning(&self) -> Option<Warning> {
+        let (time, place) = self.edge_reached.as_ref()?;
+        let message = format!(
+            "damage reached the edge of the nonlocal zone at t = {}, ({}): enlarge [zones.nonlocal] there",
+            number(*time),
+            components(place)
+        );
+        Some(Warning::new(Code::DamageAtEdge, message).at(place.as_slice()))
+    }
+
     pub(super) fn write(&self, dimension: usize, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let share = self.stable_step.map_or_else(String::new, |stable| {
             format!(" ({:.1} % of the stable step)", 100.0 * self.step / stable)
@@ -240,14 +252,6 @@ impl MotionSummary {
             )?;
         }
         rezoning_event::write(&self.switches, self.nonlocal_share, f)?;
-        if let Some((time, place)) = &self.edge_reached {
-            writeln!(
-                f,
-                "warning: damage reached the edge of the nonlocal zone at t = {}, ({}): enlarge [zones.nonlocal] there",
-                number(*time),
-                components(place)
-            )?;
-        }
         match self.ended {
             Ended::Finished => Ok(()),
             Ended::Interrupted => writeln!(f, "interrupted            go on with --resume"),

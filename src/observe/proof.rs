@@ -6,6 +6,8 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::warning::Warning;
+
 /// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -21,14 +23,13 @@ pub enum Severity {
 pub struct Finding {
     /// Its severity.
     pub severity: Severity,
-    /// Place, one coordinate per dimension \[m\]; empty where no single place is to blame.
-    pub place: Vec<f64>,
     /// The figure, in the unit that the part states.
     pub value: f64,
     /// The limit that it exceeds, in the same unit.
     pub limit: f64,
-    /// The defect, its place and size, and a remedy: one sentence for people.
-    pub message: String,
+    /// The defect, its place, its effect and remedies.
+    #[serde(flatten)]
+    pub warning: Warning,
 }
 
 /// A figure of a check.
@@ -67,12 +68,12 @@ impl Proof {
         self.parts.is_empty()
     }
 
-    /// The messages of all findings of one severity.
-    pub fn messages(&self, severity: Severity) -> impl Iterator<Item = &str> {
+    /// The findings that let the run go on.
+    pub fn warnings(&self) -> impl Iterator<Item = &Warning> {
         let findings = self.parts.iter().flat_map(|p| &p.findings);
         findings
-            .filter(move |f| f.severity == severity)
-            .map(|f| f.message.as_str())
+            .filter(|f| f.severity == Severity::Warning)
+            .map(|f| &f.warning)
     }
 }
 

@@ -10,6 +10,7 @@ pub use super::motion_summary::{Ended, EnergyGain, ImpactorSummary, MotionSummar
 use super::proof::Proof;
 pub use super::report::grouped;
 use super::report::{aligned, components, number};
+use super::warning::Warning;
 
 /// Seconds of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -227,7 +228,7 @@ pub struct RunSummary {
     pub proof: Proof,
     /// Properties of the model or the solution that may make results inaccurate.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// The largest rotation of a finite element, from 2 degrees on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotation: Option<Rotation>,
@@ -353,7 +354,7 @@ impl fmt::Display for RunSummary {
         }
         write!(f, "{}", self.proof)?;
         for warning in &self.warnings {
-            writeln!(f, "warning: {warning}")?;
+            writeln!(f, "{warning}")?;
         }
         for file in &self.files {
             writeln!(f, "wrote                  {}", file.display())?;

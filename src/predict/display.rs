@@ -75,7 +75,7 @@ impl fmt::Display for Prediction {
         )?;
         self.write_error(f)?;
         for warning in &self.warnings {
-            writeln!(f, "warning: {warning}")?;
+            writeln!(f, "{warning}")?;
         }
         Ok(())
     }

@@ -43,7 +43,8 @@ pub fn predict(scene: AnyScene, progress: &dyn Progress) -> Result<Prediction, R
         AnyScene::Solid(s) => counted::counted(s),
     };
     if let Some(mut prediction) = counted {
-        prediction.warnings.extend(scene.unused().to_vec());
+        prediction.warnings.extend(scene.unused());
+        scene.warning_policy().apply(&mut prediction.warnings);
         return Ok(prediction);
     }
     laid_out(scene, progress)
@@ -55,13 +56,14 @@ pub fn predict(scene: AnyScene, progress: &dyn Progress) -> Result<Prediction, R
 /// [`RunError`], each with place and remedy.
 pub fn laid_out(scene: AnyScene, progress: &dyn Progress) -> Result<Prediction, RunError> {
     scene.fits()?;
-    let unused = scene.unused().to_vec();
+    let (unused, policy) = (scene.unused(), scene.warning_policy().clone());
     let mut prediction = match scene {
         AnyScene::Bar(s) => with_choice(s.scene, |s| predicted(s, progress)),
         AnyScene::Plane(s) => with_choice(s.scene, |s| predicted(s, progress)),
         AnyScene::Solid(s) => with_choice(s.scene, |s| predicted(s, progress)),
     }?;
     prediction.warnings.extend(unused);
+    policy.apply(&mut prediction.warnings);
     Ok(prediction)
 }
 

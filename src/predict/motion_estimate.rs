@@ -9,6 +9,7 @@ use super::solver_estimate::Planned;
 use crate::model::Model;
 use crate::observe::checkpoint::{CheckpointFile, Fingerprint};
 use crate::observe::summary::{Decision, peak_memory_bytes, resident_memory_bytes};
+use crate::observe::warning::{Code, Warning};
 use crate::progress::Progress;
 use crate::run::RunError;
 use crate::run::budget::Share;
@@ -255,12 +256,15 @@ pub(crate) fn load_steps<const D: usize>(
             laid_out.setup.traits,
             &prediction,
         )?;
-        prediction.warnings.push(format!(
-            "the time of {} is not in the estimate: it depends on the bonds that break",
-            match spec.accuracy {
-                None => format!("{} load steps", spec.steps),
-                Some(_) => "the load steps, and their number,".to_owned(),
-            }
+        prediction.warnings.push(Warning::new(
+            Code::Cost,
+            format!(
+                "the time of {} is not in the estimate: it depends on the bonds that break",
+                match spec.accuracy {
+                    None => format!("{} load steps", spec.steps),
+                    Some(_) => "the load steps, and their number,".to_owned(),
+                }
+            ),
         ));
         if laid_out.rest.breaking.damages {
             // small runs may take minutes where cracks open

@@ -11,11 +11,12 @@ use super::solver_estimate::Planned;
 use crate::mesh::Mesh;
 use crate::model::zone_distance::Edge;
 use crate::model::{Model, PointSource, Zone};
-use crate::observe::proof::{Proof, Severity};
+use crate::observe::proof::Proof;
 use crate::observe::summary::{
     Decision, Sizes, Stopwatch, Timings, bytes_text, grouped, peak_memory_bytes,
     resident_memory_bytes,
 };
+use crate::observe::warning::{Code, Warning};
 use crate::peridynamics::{
     BondWeights, LatticeFamily, PartialVolume, TIE_TOLERANCE, isotropic_shell_factors,
 };
@@ -75,7 +76,7 @@ pub struct Prediction {
     #[serde(skip_serializing_if = "Proof::is_empty")]
     pub proof: Proof,
     /// Properties of the model that make a run costly or inaccurate.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// Predicted difference of the results from those of a finer model, where runs with other spacings tell; as `bondline check` finds out.
     pub error: Option<ErrorPrediction>,
     /// Reason why there is none, if it was looked for.
@@ -246,7 +247,7 @@ pub(crate) fn warnings<const D: usize>(
     rest: &RunSettings<D>,
     traits: CouplingTraits,
     prediction: &Prediction,
-) -> Result<Vec<String>, RunError> {
+) -> Result<Vec<Warning>, RunError> {
     let mut list = Vec::new();
     // families are judged by the one spacing of a model
     let alone =
@@ -256,19 +257,19 @@ pub(crate) fn warnings<const D: usize>(
         let horizons = body.cloud.horizon.values().iter();
         let smallest = horizons.copied().fold(f64::INFINITY, f64::min);
         if smallest < 2.0 * h * (1.0 - 1e-9) {
-            list.push(format!(
+            list.push(Warning::new(Code::SparseFamily, format!(
                 "the horizon {smallest} is {:.2} spacings: families are sparse and directions distorted; 3 to 6 are usual",
                 smallest / h
-            ));
+            )));
         }
         if p.weights == BondWeights::Isotropic
             && p.volumes == PartialVolume::Full
             && let Some((low, high)) = shell_factors(model, smallest)
             && (low < 0.5 || high > 2.0)
         {
-            list.push(format!(
+            list.push(Warning::new(Code::SparseFamily, format!(
                 "isotropic weights change shells of bonds by factors from {low:.2} to {high:.2}: choose another horizon over spacing, or weights = \"plain\""
-            ));
+            )).remedy(["peridynamics.weights=plain"]));
         }
         if let Some(width) = transition_width(&model.mesh, &model.zones) {
             let largest = body.cloud.horizon.largest();
@@ -277,10 +278,10 @@ pub(crate) fn warnings<const D: usize>(
                 _ => (0.0, ""),
             };
             if width < (wanted - 0.01) * largest {
-                list.push(format!(
+                list.push(Warning::new(Code::NarrowTransition, format!(
                     "the transition zone is {width:.3e} wide, {:.2} horizons, less than {wanted}: {why}",
                     width / largest
-                ));
+                )));
             }
         }
     }
@@ -288,11 +289,14 @@ pub(crate) fn warnings<const D: usize>(
     list.extend(of_elements(model, &model.local_laws(&rest.local_laws)));
     list.extend(unusual_stretch(model, rest)?);
     let proof = &prediction.proof;
-    list.extend(proof.messages(Severity::Warning).map(str::to_owned));
+    list.extend(proof.warnings().cloned());
     if prediction.sizes.bonds > MANY_BONDS {
-        list.push(format!(
-            "{} bonds: shrink the nonlocal zone or the horizon over spacing",
-            grouped(prediction.sizes.bonds)
+        list.push(Warning::new(
+            Code::Cost,
+            format!(
+                "{} bonds: shrink the nonlocal zone or the horizon over spacing",
+                grouped(prediction.sizes.bonds)
+            ),
         ));
     }
     Ok(list)

@@ -16,6 +16,7 @@ use crate::observe::checkpoint::Fingerprint;
 use crate::observe::pieces::agreed;
 use crate::observe::provenance::{self, Provenance};
 use crate::observe::summary::{Decision, RunSummary};
+use crate::observe::warning::{Policy, Warning};
 use crate::progress::Progress;
 use crate::scene::draft::Draft;
 use crate::scene::expression::Expression;
@@ -52,7 +53,7 @@ fn run<const D: usize>(
     let claim = || scene.output.claim(&scene.title, !is_static, processes);
     let claimed = options.writes().then(claim).transpose();
     let _claim = agreed(options.ranks, claimed, &scene.output.directory)?;
-    let unused = scene.unused.clone();
+    let (unused, policy) = (scene.unused(), scene.warnings.clone());
     let scene_hash = provenance::scene_hash(scene.fingerprint.value());
     let path = scene.output.provenance_path();
     let mut summary = match is_static {
@@ -60,6 +61,7 @@ fn run<const D: usize>(
         false => with_choice(scene.scene, |scene| motion::run(scene, options, progress))?,
     };
     summary.warnings.extend(unused);
+    policy.apply(&mut summary.warnings);
     (summary.version, summary.scene_hash) = (provenance::VERSION, scene_hash);
     // under the claim still: another run of the scene would take a file half written for a leftover
     if let Some(program) = options.program.filter(|_| options.writes())
@@ -210,8 +212,13 @@ impl AnyScene {
     }
 
     /// Warnings of parts of the scene that touch nothing.
-    pub fn unused(&self) -> &[String] {
-        each!(self, s => &s.unused)
+    pub fn unused(&self) -> Vec<Warning> {
+        each!(self, s => s.unused())
+    }
+
+    /// Kinds of warnings that the scene leaves out or does not accept.
+    pub fn warning_policy(&self) -> &Policy {
+        each!(self, s => &s.warnings)
     }
 
     /// Refuses what needs more memory than there is, before anything of it is laid out.

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::material::LocalLaw;
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::CheckpointError;
+use crate::observe::warning::Warning;
 use crate::peridynamics::FractureError;
 use crate::solve::explicit::ExplicitError;
 use crate::solve::quasi_static::QuasiStaticError;
@@ -41,24 +42,6 @@ pub enum RunError {
     /// The time step, or the model at any step, is not stable.
     #[error(transparent)]
     Step(#[from] StepError),
-    /// A mode of the coupled model doubles the energy within the run, whatever the step.
-    #[error(
-        "this model is unstable in time at any step: a mode largest at ({}) grows as exp({rate:.3e} t), by exp({gain:.1}) over the run (eigenvalue {real:.3e} + {imaginary:.3e} i of M⁻¹K, which should be real and positive); {remedy}; or let it begin with solve.explicit.growing-modes = \"warn\"", place.iter().map(|x| format!("{x:.4e}")).collect::<Vec<_>>().join(", ")
-    )]
-    Grows {
-        /// Position of the mode's largest amplitude.
-        place: Vec<f64>,
-        /// σ \[1/s\].
-        rate: f64,
-        /// σ times the duration of the run.
-        gain: f64,
-        /// Real part of its eigenvalue \[1/s²\].
-        real: f64,
-        /// Imaginary part.
-        imaginary: f64,
-        /// Remedy.
-        remedy: &'static str,
-    },
     /// The stiffest sites cannot take sub-steps.
     #[error(transparent)]
     SubCycling(#[from] SubCyclingError),
@@ -100,6 +83,9 @@ pub enum RunError {
     /// The state cannot be carried over to other zones.
     #[error(transparent)]
     Carry(#[from] CarryError),
+    /// The model has a property of which the scene denies warnings.
+    #[error("{}; warnings.deny has {}", .0.message, .0.code)]
+    Denied(Box<Warning>),
     /// A check of the model failed, so that no result of it can be trusted.
     #[error("{message}; or let it run with solver.unproven = \"warn\"")]
     Unproven {
@@ -206,7 +192,8 @@ impl RunError {
             (!x.is_empty()).then(|| format!("({})", x.join(", ")))
         };
         match self {
-            Self::Grows { place, .. } | Self::Unproven { place, .. } => at(place),
+            Self::Denied(warning) => at(&warning.place),
+            Self::Unproven { place, .. } => at(place),
             Self::Law { place, source, .. } => match place {
                 Some(place) => at(place),
                 None => source.place(),

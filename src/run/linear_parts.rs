@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::coupling::semidiscrete::behaviour::BondThreshold;
 use crate::observe::report::number;
+use crate::observe::warning::{Code, Warning};
 use crate::peridynamics::{Departure, largest_extension};
 use crate::run::error::RunError;
 use crate::run::motion::dynamic_system::failure_criterion;
@@ -321,11 +322,15 @@ impl<'m, const D: usize> LinearParts<'m, D> {
     }
 
     /// The warnings of a run that ends at a time.
-    pub fn told(&self, passed: &Passed, time: f64) -> impl Iterator<Item = String> {
+    pub fn told(&self, passed: &Passed, time: f64) -> impl Iterator<Item = Warning> {
+        let beyond =
+            |p: &Passing, message| Warning::new(Code::BeyondRange, message).at(&p.place[..D]);
         let all = [
-            passed.elements.map(|p| self.elements_passed(&p)),
-            passed.rows.map(|p| self.rows_passed(&p)),
-            passed.bonds.map(|p| self.bonds_passed(&p)),
+            passed
+                .elements
+                .map(|p| beyond(&p, self.elements_passed(&p))),
+            passed.rows.map(|p| beyond(&p, self.rows_passed(&p))),
+            passed.bonds.map(|p| beyond(&p, self.bonds_passed(&p))),
             self.not_relaxed(time),
         ];
         all.into_iter().flatten()
@@ -426,7 +431,7 @@ impl<'m, const D: usize> LinearParts<'m, D> {
     }
 
     /// Elements and rows that are elastic where their material loses stress with the time.
-    fn not_relaxed(&self, time: f64) -> Option<String> {
+    fn not_relaxed(&self, time: f64) -> Option<Warning> {
         let of = |material: u16| match self.departure(material, &small_shear(), time) {
             Departure::WithTime { lost, in_elements } => (lost, in_elements),
             Departure::AtStrain { .. } | Departure::None => (0.0, None),
@@ -451,11 +456,14 @@ impl<'m, const D: usize> LinearParts<'m, D> {
         let counts = counts.into_iter().filter(|(n, _)| *n > 0);
         let counts: Vec<String> = counts.map(|(n, what)| counted(n as u64, what)).collect();
         let at_seam = if rows.is_empty() { "" } else { " at the seam" };
-        Some(format!(
-            "{}{at_seam} stay elastic, where the material {} would lose {:.0} % of a stress that is held until the end: let the nonlocal zone hold what relaxes, zones.nonlocal, or couple by nonlocal{instead}",
-            counts.join(" and "),
-            self.name(worst),
-            100.0 * share
+        Some(Warning::new(
+            Code::Relaxation,
+            format!(
+                "{}{at_seam} stay elastic, where the material {} would lose {:.0} % of a stress that is held until the end: let the nonlocal zone hold what relaxes, zones.nonlocal, or couple by nonlocal{instead}",
+                counts.join(" and "),
+                self.name(worst),
+                100.0 * share
+            ),
         ))
     }
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::material::LocalLaw;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::{Decision, Sizes};
+use crate::observe::warning::Policy;
 use crate::peridynamics::PartialVolume;
 use crate::peridynamics::bond_force::BondKinematics;
 use crate::progress::Progress;
@@ -55,6 +56,8 @@ pub struct RunSettings<const D: usize> {
     pub ratio: Ratio,
     /// Rule by which the nonlocal zone follows damage, where it does.
     pub follow: Option<Follow>,
+    /// Kinds of warnings that are not accepted.
+    pub warnings: Policy,
     /// A number for all that determines the results.
     pub fingerprint: Fingerprint,
     /// Model that elements of the points' materials follow.
@@ -216,6 +219,7 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
         RunSettings {
             conditions: scene.conditions,
             solver: scene.solver,
+            warnings: scene.warnings,
             output: scene.output,
             initial: scene.initial,
             impactors: scene.impactors,

@@ -9,6 +9,7 @@ use super::motion;
 use crate::coupling::semidiscrete::CoupledSystem;
 use crate::observe::report::number;
 use crate::observe::summary::{Decision, Stopwatch, Timings};
+use crate::observe::warning::{Code, Warning};
 use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::run::setup::RunSettings;
@@ -27,7 +28,7 @@ pub(super) struct Apart<'a, const D: usize> {
     /// The system of the body in it, where it is not linear.
     pub system: Option<CoupledSystem<'a, D>>,
     /// A warning of surfaces that nothing keeps apart here.
-    pub warning: Option<String>,
+    pub warning: Option<Warning>,
 }
 
 /// The equilibrium of a body whose surfaces, or the faces of whose cracks, lie in each other at the one that is `free` of contact.
@@ -68,19 +69,19 @@ pub(super) fn with_contact<'a, const D: usize>(
         return Ok(apart);
     }
     if model.spread.shared.is_some() {
-        apart.warning = Some(format!(
-            "faces of a crack lie in each other by {}: a static scene of several processes does not keep them apart; run it in one, or in load steps (solve.quasi-static.steps = 1)",
-            number(deepest)
-        ));
+        let depth = number(deepest);
+        let message = format!(
+            "faces of a crack lie in each other by {depth}: a static scene of several processes does not keep them apart; run it in one, or in load steps (solve.quasi-static.steps = 1)"
+        );
+        apart.warning = Some(Warning::new(Code::CrackOverlap, message));
         return Ok(apart);
     }
     let mut clock = Stopwatch::start();
     let knows_temperature = rest.stresses.thermal.is_some();
-    let (coupling, operator) = (at.coupling, at.operator);
-    let mut own =
-        motion::dynamic_system::still(model, coupling, operator, rest, knows_temperature)?;
+    let (coupling, op) = (at.coupling, at.operator);
+    let mut own = motion::dynamic_system::still(model, coupling, op, rest, knows_temperature)?;
     let mut linear = own.is_none().then(|| LinearMotion {
-        stiffness: model.assemble(operator, progress),
+        stiffness: model.assemble(op, progress),
         mass: vec![1.0; model.sites.len()],
         symmetry: free.symmetry,
     });

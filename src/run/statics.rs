@@ -22,6 +22,7 @@ use crate::observe::summary::{
     ConditionForce, Decision, Rotation, RunSummary, SectionForce, Sizes, Stopwatch, Timings,
     peak_memory_bytes,
 };
+use crate::observe::warning::Warning;
 use crate::progress::Progress;
 use crate::run::balance::{Balance, furthest, round_off};
 use crate::run::definiteness;
@@ -29,7 +30,7 @@ use crate::run::error::RunError;
 use crate::run::linear_parts::{LinearParts, Passed, RunKind};
 use crate::run::surface_gradient::{Asked, steep_stresses};
 use crate::run::warnings::{Imbalance, indefinite, of_elements, out_of_balance, warnings};
-use crate::scene::spec::{CouplingTraits, ElementsSpec};
+use crate::scene::spec::{CouplingTraits, ElementsSpec, UnprovenSpec};
 use crate::scene::validated::{Output, Scene};
 use crate::solve::krylov::LinearMap;
 use crate::solve::statics::MethodUsed;
@@ -178,6 +179,7 @@ fn solve_chosen<const D: usize>(
         sections: &sections,
         stresses: (&rest.stresses, 0.0),
     };
+    let told = body.summary(equilibrium, traits, proof)?;
     let files = visit(&rest.output, &solved)?;
     watch.lap(&mut timings, "output");
     progress.finish();
@@ -190,7 +192,7 @@ fn solve_chosen<const D: usize>(
         peak_memory_bytes: peak_memory_bytes(),
         files,
         sections,
-        ..body.summary(equilibrium, traits, proof)?
+        ..told
     };
     summary.warnings.extend(apart.warning);
     Ok(summary)
@@ -331,7 +333,7 @@ impl<'a, const D: usize> StaticBody<'a, D> {
     /// Summary of the solution: forces, energy, rotation, warnings.
     ///
     /// # Errors
-    /// [`RunError::Fracture`] for a fracture energy that gives no stretch.
+    /// [`RunError::Fracture`] for a fracture energy that gives no stretch, [`RunError::Unproven`] for a seam out of balance whose displacements are wrong by more than themselves.
     fn summary(
         &self,
         equilibrium: &Equilibrium,
@@ -359,7 +361,17 @@ impl<'a, const D: usize> StaticBody<'a, D> {
         let least = round_off(self.model, furthest(&solution.displacement));
         if balance.scale > least {
             let known = self.imbalance(&balance, &solution.displacement);
-            told.extend(out_of_balance(&known, traits));
+            let warning = out_of_balance(&known, traits);
+            let is_hopeless = known.difference.is_some_and(|part| part > 1.0);
+            if let Some(warning) = warning.clone().filter(|_| is_hopeless)
+                && self.rest.solver.unproven == UnprovenSpec::Refuse
+            {
+                return Err(RunError::Unproven {
+                    message: warning.message,
+                    place: Vec::new(),
+                });
+            }
+            told.extend(warning);
         }
         let stresses = &self.rest.stresses;
         // strains of free expansion are no stress
@@ -409,7 +421,7 @@ impl<'a, const D: usize> StaticBody<'a, D> {
     ///
     /// # Errors
     /// [`RunError::Fracture`] for a fracture energy that gives no stretch.
-    fn passed(&self, u: &[f64]) -> Result<Vec<String>, RunError> {
+    fn passed(&self, u: &[f64]) -> Result<Vec<Warning>, RunError> {
         let how = (RunKind::Static, self.has_exact_seam);
         let parts = LinearParts::new(self.model, self.operator, self.rest, how, self.ranks)?;
         let mut passed = Passed::default();

@@ -4,12 +4,13 @@ use rustc_hash::FxHashMap;
 
 use crate::material::Kinematics;
 use crate::observe::report::number;
+use crate::observe::warning::{Code, Quantity, Warning};
 use crate::shape::Barrier;
 use crate::system::Ranks;
 use crate::tensor::{Tensor, Tensor4, Vector, inverse, strain};
 use crate::{
     fem,
-    model::{Model, SiteKind},
+    model::{HorizonField, Model, PointSource, SiteKind},
     parallel,
 };
 
@@ -42,7 +43,7 @@ pub(super) fn steep_stresses<const D: usize>(
     model: &Model<D>,
     ranks: Option<&dyn Ranks>,
     asked: &Asked<'_>,
-) -> Vec<String> {
+) -> Vec<Warning> {
     if D == 1 || model.body().is_none() {
         return Vec::new();
     }
@@ -132,7 +133,7 @@ fn missed_peak<const D: usize>(
     ranks: Option<&dyn Ranks>,
     asked: &Asked<'_>,
     stresses: &[f64],
-) -> Option<String> {
+) -> Option<Warning> {
     let cloud = &model.body()?.cloud;
     let largest = shown(model).map(|p| stresses[p]).fold(0.0, f64::max);
     // stress at the surface beyond that of the point, for a stress that is linear over the family
@@ -161,11 +162,11 @@ fn missed_peak<const D: usize>(
     let (p, missed) = found.max_by(|a, b| a.1.total_cmp(&b.1))?;
     (missed > asked.uniform.max(MISSED) * stresses[p]).then(|| {
         let place: Vec<String> = cloud.position[p].iter().map(|x| number(*x)).collect();
-        format!(
+        finer(Warning::new(Code::SurfacePeak, format!(
             "the largest stress of the points lies at a free surface, at ({}), and falls off within a family: points have means over families, which do not resolve its peak: that of outputs may be wrong by {:.0} % and more; take a smaller horizon there, or let elements carry the surface and what lies within two horizons of it",
             place.join(", "),
             100.0 * missed / stresses[p]
-        )
+        )).of(Quantity::Stress, -missed / stresses[p]).at(cloud.position[p].as_slice()), model)
     })
 }
 
@@ -178,7 +179,7 @@ fn peak_at_seam<const D: usize>(
     ranks: Option<&dyn Ranks>,
     asked: &Asked<'_>,
     stresses: &[f64],
-) -> Option<String> {
+) -> Option<Warning> {
     let (mesh, cloud) = (&model.mesh, &model.body()?.cloud);
     let gradient_of = |c: usize| {
         let node = |n: usize| model.node_transfer.displacement(n, asked.displacement);
@@ -223,13 +224,29 @@ fn peak_at_seam<const D: usize>(
     let fitted = size(asked, model.tensor_of_cell(cell), &fitted);
     let off = OF_DIFFERENCE * (fitted / largest - 1.0).abs();
     (off > BENT).then(|| {
+        let at = place;
         let place: Vec<String> = place.iter().map(|x| number(*x)).collect();
-        format!(
+        finer(Warning::new(Code::SeamPeak, format!(
             "the largest stress lies in an element beside the seam, at ({}), where strains are not linear from one place to the next: it may be wrong by {:.0} %; let elements carry what lies within two horizons of this place, or take a smaller horizon and spacing",
             place.join(", "),
             100.0 * off
-        )
+        )).of(Quantity::Stress, off).at(at.as_slice()), model)
     })
+}
+
+/// With a remedy: bonds that end on faces where the coupling is by forces, whose rows know of no surface; else half the horizon and spacing, of points on one lattice.
+fn finer<const D: usize>(warning: Warning, model: &Model<D>) -> Warning {
+    let has_elements = (0..model.mesh.cell_count()).any(|c| model.is_element(c));
+    if has_elements && !model.faces_cut_bonds() {
+        return warning.remedy(["coupling=truncated"]);
+    }
+    let of = model.peridynamics.as_ref().map(|p| (&p.horizon, &p.points));
+    let Some((HorizonField::Uniform(horizon), PointSource::Lattice { spacing, .. })) = of else {
+        return warning;
+    };
+    let horizon = format!("peridynamics.horizon={}", 0.5 * horizon);
+    let points = format!("peridynamics.points.lattice.spacing={}", 0.5 * spacing);
+    warning.remedy([&horizon, &points])
 }
 
 /// The stress across the plane of a plate.

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use crate::material::LocalLaw;
 use crate::mesh::{CellShape, quality};
 use crate::model::{CellRole, Model, Zone};
-use crate::observe::proof::{Proof, Severity};
+use crate::observe::proof::Proof;
 use crate::observe::report::number;
+use crate::observe::warning::{Code, Quantity, Warning};
 use crate::run::error::RunError;
 use crate::run::motion::dynamic_system::failing_stretch;
 use crate::run::setup::RunSettings;
@@ -16,9 +17,10 @@ use crate::solve::statics::MethodUsed;
 use crate::system::{SemiDiscrete, Symmetry};
 
 /// All doubts about a model.
-pub fn doubts<const D: usize>(model: &Model<D>, traits: CouplingTraits) -> Vec<String> {
+pub fn doubts<const D: usize>(model: &Model<D>, traits: CouplingTraits) -> Vec<Warning> {
     let all = [one_sided(model), crack_beside_seam(model, traits)];
-    let notes = model.mesh.notes.iter().cloned();
+    let notes = model.mesh.notes.iter();
+    let notes = notes.map(|note| Warning::new(Code::Mesh, note.as_str()));
     notes.chain(all.into_iter().flatten()).collect()
 }
 
@@ -27,8 +29,8 @@ pub(crate) fn warnings<const D: usize>(
     model: &Model<D>,
     traits: CouplingTraits,
     proof: &Proof,
-) -> Vec<String> {
-    let proved = proof.messages(Severity::Warning).map(str::to_owned);
+) -> Vec<Warning> {
+    let proved = proof.warnings().cloned();
     proved.chain(doubts(model, traits)).collect()
 }
 
@@ -43,25 +45,31 @@ const USUAL_STRETCHES: std::ops::RangeInclusive<f64> = 2e-5..=1.0;
 pub(crate) fn unusual_stretch<const D: usize>(
     model: &Model<D>,
     rest: &RunSettings<D>,
-) -> Result<Option<String>, RunError> {
+) -> Result<Option<Warning>, RunError> {
     // of bonds that soften that at which they would break at once: by it units are known
     let softening = rest.breaking.softening.softening();
     let stretch =
         failing_stretch(model, rest)?.map(|s| softening.map_or(s, |of| s * of.ratio.sqrt()));
     Ok(stretch.filter(|s| !USUAL_STRETCHES.contains(s)).map(|s| {
-        format!(
-            "bonds break at a stretch of {}: check the units of Young's modulus, fracture energy and lengths, which must be consistent (N, m, Pa and J/m², or N, mm, MPa and N/mm)",
-            number(s)
+        Warning::new(
+            Code::Units,
+            format!(
+                "bonds break at a stretch of {}: check the units of Young's modulus, fracture energy and lengths, which must be consistent (N, m, Pa and J/m², or N, mm, MPa and N/mm)",
+                number(s)
+            ),
         )
     }))
 }
 
 /// Points of a torn body whose law no longer responds.
-pub(crate) fn without_response(system: &dyn SemiDiscrete, u: &[f64]) -> Option<String> {
+pub(crate) fn without_response(system: &dyn SemiDiscrete, u: &[f64]) -> Option<Warning> {
     let points = system.body_state()?.points_without_response(u);
     (points > 0).then(|| {
-        format!(
-            "{points} points have lost so many bonds that what is left does not span their surroundings, or has turned inside out: they have no deformation gradient, carry no stress of their own, and follow the bonds of their neighbours"
+        Warning::new(
+            Code::TornPoints,
+            format!(
+                "{points} points have lost so many bonds that what is left does not span their surroundings, or has turned inside out: they have no deformation gradient, carry no stress of their own, and follow the bonds of their neighbours"
+            ),
         )
     })
 }
@@ -93,7 +101,7 @@ impl Imbalance<'_> {
 }
 
 /// A solution whose loads and reactions do not balance.
-pub(crate) fn out_of_balance(of: &Imbalance<'_>, traits: CouplingTraits) -> Option<String> {
+pub(crate) fn out_of_balance(of: &Imbalance<'_>, traits: CouplingTraits) -> Option<Warning> {
     let force: Vec<String> = of.force.iter().map(|f| number(*f)).collect();
     // rows of a seam that cuts bonds balance whatever their displacements are
     let remedy = match traits.name {
@@ -113,20 +121,27 @@ pub(crate) fn out_of_balance(of: &Imbalance<'_>, traits: CouplingTraits) -> Opti
             .to_owned(),
     };
     of.is_told().then(|| {
-        format!(
+        let message = format!(
             "loads and reactions are out of balance by {:.2} % of the sum of them all, by the force ({}), and displacements {displacements} (coupling `{}`): {remedy}",
             100.0 * of.relative,
             force.join(", "),
             traits.name
-        )
+        );
+        let warning = Warning::new(Code::Imbalance, message).of(Quantity::Displacement, of.difference);
+        warning.remedy(match traits.name {
+            "truncated" => ["coupling=nonlocal"],
+            _ => ["coupling=truncated"],
+        })
     })
 }
 
 /// A symmetric stiffness that took an LU factorisation, since that of Cholesky met a pivot that is not positive.
-pub(crate) fn indefinite(symmetry: Symmetry, method: MethodUsed) -> Option<String> {
+pub(crate) fn indefinite(symmetry: Symmetry, method: MethodUsed) -> Option<Warning> {
     (symmetry == Symmetry::Symmetric && method == MethodUsed::Lu).then(|| {
-        "the stiffness is symmetric and not positive definite: the solution is an equilibrium, and not one of least energy, so that a motion would leave it; leave peridynamics.points out, whose lattice follows the mesh, or draw the zone wider than its families"
-            .to_owned()
+        Warning::new(
+            Code::Indefinite,
+            "the stiffness is symmetric and not positive definite: the solution is an equilibrium, and not one of least energy, so that a motion would leave it; leave peridynamics.points out, whose lattice follows the mesh, or draw the zone wider than its families",
+        )
     })
 }
 
@@ -134,7 +149,7 @@ pub(crate) fn indefinite(symmetry: Symmetry, method: MethodUsed) -> Option<Strin
 pub(crate) fn of_elements<const D: usize>(
     model: &Model<D>,
     laws: &[Option<Arc<dyn LocalLaw<D>>>],
-) -> impl Iterator<Item = String> + use<D> {
+) -> impl Iterator<Item = Warning> + use<D> {
     let flows = |c: usize| {
         let law = laws[model.material_of_cell(c) as usize].as_ref();
         law.is_some_and(|law| law.flows_at_constant_volume())
@@ -152,15 +167,15 @@ pub(crate) fn of_elements<const D: usize>(
 }
 
 /// Elements of one quadrature point whose material flows at constant volume.
-fn flowing<const D: usize>(model: &Model<D>, flows: impl Fn(usize) -> bool) -> Option<String> {
+fn flowing<const D: usize>(model: &Model<D>, flows: impl Fn(usize) -> bool) -> Option<Warning> {
     let is_simplex = |c: usize| matches!(model.mesh.shapes[c], CellShape::Tri3 | CellShape::Tet4);
     let count = (0..model.mesh.cell_count())
         .filter(|&c| model.is_element(c) && is_simplex(c) && flows(c))
         .count();
     (count > 0).then(|| {
-        format!(
+        Warning::new(Code::FlowInSimplices, format!(
             "{count} tri3 or tet4 elements flow at constant volume, which such cells resist: where they flow they are too stiff; mesh them with quad4 or hex8 cells"
-        )
+        ))
     })
 }
 
@@ -168,7 +183,7 @@ fn flowing<const D: usize>(model: &Model<D>, flows: impl Fn(usize) -> bool) -> O
 const ELONGATED: f64 = 2.0;
 
 /// Elements of a law that softens in which the width of a crack depends on its direction.
-fn elongated<const D: usize>(model: &Model<D>, softens: impl Fn(usize) -> bool) -> Option<String> {
+fn elongated<const D: usize>(model: &Model<D>, softens: impl Fn(usize) -> bool) -> Option<Warning> {
     if D == 1 {
         return None;
     }
@@ -180,12 +195,12 @@ fn elongated<const D: usize>(model: &Model<D>, softens: impl Fn(usize) -> bool) 
     let (count, largest) = cells.fold((0, 0.0_f64), |(n, most), r| (n + 1, most.max(r)));
     let factor = largest.sqrt();
     (count > 0).then(|| {
-        format!(
+        Warning::new(Code::CrackBand, format!(
             "{count} elements that soften are up to {} times as long as wide: a crack takes {} to {} of the fracture energy there, by its direction (docs/methods.md, section 1); mesh where cracks run with edges of one length",
             number(largest),
             number(1.0 / factor),
             number(factor)
-        )
+        ))
     })
 }
 
@@ -198,7 +213,7 @@ const NEARLY_INCOMPRESSIBLE: f64 = 0.45;
 fn nearly_incompressible<const D: usize>(
     model: &Model<D>,
     flows: impl Fn(usize) -> bool,
-) -> Option<String> {
+) -> Option<Warning> {
     if D == 1 {
         return None;
     }
@@ -215,15 +230,15 @@ fn nearly_incompressible<const D: usize>(
         .filter(|ratio| *ratio > NEARLY_INCOMPRESSIBLE);
     let (count, largest) = cells.fold((0, 0.0_f64), |(n, most), r| (n + 1, most.max(r)));
     (count > 0).then(|| {
-        format!(
+        Warning::new(Code::Locking, format!(
             "{count} elements of first order have a Poisson ratio of up to {}: they resist bending at nearly constant volume (volumetric locking), and displacements may be far too small; mesh them with cells of second order (quad8, tri6, hex20, tet10)",
             number(largest)
-        )
+        ))
     })
 }
 
 /// Warns of elements with a partial stress at the surface of the body: measured in `docs/bars.md`.
-fn one_sided<const D: usize>(model: &Model<D>) -> Option<String> {
+fn one_sided<const D: usize>(model: &Model<D>) -> Option<Warning> {
     if D == 1 || !model.roles.contains(&CellRole::StressElement) {
         return None;
     }
@@ -233,14 +248,14 @@ fn one_sided<const D: usize>(model: &Model<D>) -> Option<String> {
         .filter(|(outer, role)| **outer && **role == CellRole::StressElement)
         .count();
     (count > 0).then(|| {
-        format!(
+        Warning::new(Code::TransitionAtSurface, format!(
             "{count} elements with a partial stress lie at the surface of the body, where families are one-sided: strains of the transition zone may alternate from element to element, the more the wider it is and the larger the horizon over spacing (docs/bars.md); enclose it in elements, or use another coupling"
-        )
+        )).remedy(["coupling=truncated"])
     })
 }
 
 /// Cracks and voids so near to the seam that what is computed on this side of it lacks bonds: `bondline verify extremes`, "Cracks beside the seam".
-fn crack_beside_seam<const D: usize>(model: &Model<D>, traits: CouplingTraits) -> Option<String> {
+fn crack_beside_seam<const D: usize>(model: &Model<D>, traits: CouplingTraits) -> Option<Warning> {
     let p = model.peridynamics.as_ref()?;
     let horizons = match traits.name {
         "splice" => SPLICE,
@@ -267,12 +282,12 @@ fn crack_beside_seam<const D: usize>(model: &Model<D>, traits: CouplingTraits) -
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
     (nearest.0 < horizons * (1.0 + 1e-3)).then(|| {
         let place: Vec<String> = nearest.1.iter().map(|x| format!("{x:.4e}")).collect();
-        format!(
+        Warning::new(Code::CrackAtSeam, format!(
             "a crack or void lies {:.2} horizons from the seam at ({}), where {} wants more than {horizons}: displacements are off by a few per cent to all of their size (docs/methods.md); enlarge [zones.nonlocal], or use coupling.truncated",
             nearest.0,
             place.join(", "),
             traits.name
-        )
+        )).at(nearest.1.as_slice()).remedy(["coupling=truncated"])
     })
 }
 

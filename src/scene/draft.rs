@@ -276,13 +276,8 @@ impl<'a, const D: usize> Draft<'a, D> {
         instead: Option<&CouplingSpec>,
     ) -> Result<(Scene<D>, Option<CouplingSpec>), SceneError> {
         let (spec, mesh) = (self.spec, &self.mesh);
-        let mut selected = coupling_selection::selected(
-            spec,
-            (&self.materials, &self.cell_material),
-            mesh,
-            placed,
-            instead,
-        )?;
+        let materials = (&self.materials[..], &self.cell_material[..]);
+        let mut selected = coupling_selection::selected(spec, materials, mesh, placed, instead)?;
         let traits = selected.traits;
         self.refuse_missing_peridynamics(&selected)?;
         let mut zones = zones::zones(spec, &selected, mesh, placed)?;
@@ -346,6 +341,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             otherwise: None,
             refused_rim: None,
             unused: Vec::new(),
+            warnings: spec.warnings.policy(),
             fingerprint: self.fingerprint.clone(),
         };
         Ok((scene, selected.otherwise))

@@ -6,8 +6,7 @@ use super::bounds_checks;
 use super::error::SceneError;
 use super::expression::Expression;
 use super::spec::{
-    BeyondLimitSpec, ExplicitSpec, GrowingModesSpec, LoadStepSpec, QuasiStaticSpec, SolveSpec,
-    WhenPartedSpec,
+    BeyondLimitSpec, ExplicitSpec, LoadStepSpec, QuasiStaticSpec, SolveSpec, WhenPartedSpec,
 };
 use super::value::{Count, Every, INTERVALS, Number, StepTimes};
 use crate::observe::checkpoint::Pace;
@@ -38,8 +37,6 @@ pub struct Explicit {
     pub beyond_limit: BeyondLimitSpec,
     /// Steps that the stiffest sites take in each step of all others, if not one.
     pub sub_steps: Option<u32>,
-    /// Treatment of a run in which a mode doubles the energy.
-    pub growing_modes: GrowingModesSpec,
     /// Energy gained without work, as a part of the largest energy, at which the run stops.
     pub largest_energy_gain: f64,
     /// Rotation of an element in degrees at which the run stops.
@@ -251,7 +248,6 @@ fn explicit(spec: &ExplicitSpec, has_large_strains: bool) -> Result<Explicit, Sc
         fraction,
         beyond_limit: spec.beyond_limit,
         sub_steps: sub_steps(spec.sub_steps.as_ref())?,
-        growing_modes: spec.growing_modes,
         largest_energy_gain: match &spec.largest_energy_gain {
             Some(gain) => bounds_checks::positive(&place("largest-energy-gain"), gain)?,
             None => LARGEST_ENERGY_GAIN,

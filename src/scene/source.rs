@@ -391,7 +391,7 @@ const WITHOUT_EFFECT: &[&[&str]] = &[
     &["title"],
     &["output", "directory"],
     &["zones", "damage-at-edge"],
-    &["solve", "explicit", "growing-modes"],
+    &["warnings"],
     &["solve", "explicit", "largest-energy-gain"],
     &["solve", "explicit", "largest-rotation"],
     &["solve", "quasi-static", "largest-rotation"],

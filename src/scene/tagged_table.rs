@@ -37,6 +37,7 @@ const TOP: &[&str] = &[
     "impactors",
     "solver",
     "output",
+    "warnings",
 ];
 
 /// Keys of a choice, sorted: those that its type reads.

@@ -19,6 +19,7 @@ use crate::mesh::Mesh;
 use crate::model::Zone;
 use crate::observe::checkpoint::Fingerprint;
 use crate::observe::summary::Decision;
+use crate::observe::warning::{Code, Policy, Warning};
 use crate::peridynamics::Law;
 use crate::shape::{Barrier, Shape};
 use crate::solve::ordering::Ordering;
@@ -81,8 +82,10 @@ pub struct Scene<const D: usize> {
     pub(crate) otherwise: Option<Box<Self>>,
     /// Reason for which the zone has no rim of its own where it would gain by one.
     pub(crate) refused_rim: Option<String>,
-    /// Warnings of parts that touch nothing.
+    /// Sentences about parts that touch nothing.
     pub unused: Vec<String>,
+    /// Kinds of warnings that are left out or not accepted.
+    pub warnings: Policy,
     /// A number for the scene's text, by which a checkpoint knows that it belongs to it.
     pub fingerprint: Fingerprint,
 }
@@ -173,6 +176,12 @@ pub struct Tip<const D: usize> {
 }
 
 impl<const D: usize> Scene<D> {
+    /// Warnings of parts that touch nothing.
+    pub fn unused(&self) -> Vec<Warning> {
+        let of = |text: &String| Warning::new(Code::Unused, text.as_str());
+        self.unused.iter().map(of).collect()
+    }
+
     /// Returns true if the horizon varies in space.
     pub fn horizon_varies(&self) -> bool {
         self.peridynamics

@@ -8,7 +8,7 @@ use crate::{Case, percent};
 fn told(text: &str, overrides: &[&str], words: &str) -> Option<String> {
     let summary = Case::new(text).run(overrides).expect("it runs");
     let list = summary["warnings"].as_array().into_iter().flatten();
-    let mut texts = list.filter_map(|w| w.as_str());
+    let mut texts = list.filter_map(|w| w["message"].as_str());
     texts.find(|w| w.contains(words)).map(str::to_owned)
 }
 

@@ -102,8 +102,6 @@ fn sites_that_nodes_follow_have_a_mass() {
             "materials.m={bond-based={youngs-modulus=1,density=1}}",
             "--set",
             "solve.explicit.duration=0.01",
-            "--set",
-            "solve.explicit.growing-modes=warn",
         ])
         .expect("every row has a mass");
     assert!(crate::b::ledger(&said) < 1e-12, "{}", said["proof"]);

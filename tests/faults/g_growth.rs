@@ -32,8 +32,11 @@ duration = 2e-3
 #[test]
 fn growth_on_triangles_is_found_before_the_first_step() {
     // a tenth of these steps is too short for the mode to show in noise: the eigenvalues near the seam tell
-    let said = Case::new(PANEL).with_file("l.msh").run(&[]).unwrap_err();
-    for part in ["unstable in time", "largest at (", "coupling.truncated"] {
+    let summary = Case::new(PANEL).with_file("l.msh").run(&[]);
+    let summary = summary.expect("hardly anything of the mode is in this motion");
+    let said = summary["warnings"].to_string();
+    for part in ["grows as exp(", "largest at (", "coupling.truncated", "W17"] {
         assert!(said.contains(part), "{said}");
     }
+    assert_eq!(summary["motion"]["ended"], "finished");
 }

@@ -50,7 +50,7 @@ const EXPLICIT: &str = "[solve.explicit]\nduration = 1e-10\noutputs = 1";
 fn warnings(text: &str, overrides: &[&str]) -> Vec<String> {
     let summary = Case::new(text).run(overrides).expect("it runs");
     let list = summary["warnings"].as_array().into_iter().flatten();
-    let text = |w: &serde_json::Value| w.as_str().expect("a text").to_owned();
+    let text = |w: &serde_json::Value| w["message"].as_str().expect("a text").to_owned();
     list.map(text).collect()
 }
 

@@ -1,4 +1,4 @@
-//! The balanced coupling in motion: refused where a mode would double the energy, stopped where it does.
+//! The balanced coupling in motion: a mode that grows is told, and the run stops where it gains energy.
 
 use crate::Case;
 
@@ -30,19 +30,12 @@ vtu = false
 "#;
 
 #[test]
-fn a_mode_that_doubles_the_energy_is_found_before_the_first_step() {
+fn a_mode_that_grows_is_told_and_stops_the_run() {
     let case = Case::new(PLATE);
-    let said = case.run(&[]).unwrap_err();
-    for part in ["unstable in time", "largest at (", "coupling.truncated"] {
-        assert!(said.contains(part), "{said}");
-    }
-    let told = case.command("run", &["--set", "solve.explicit.growing-modes=warn"]);
+    let told = case.command("run", &[]);
     assert_eq!(told.status.code(), Some(3));
     let said = String::from_utf8_lossy(&told.stdout);
-    assert!(
-        said.contains("a mode of the seam grows by a factor of"),
-        "{said}"
-    );
+    assert!(said.contains("a mode of the seam grows as exp("), "{said}");
     assert!(
         said.contains("% of its largest energy without work"),
         "{said}"

@@ -40,13 +40,8 @@ fn growth_that_a_run_from_noise_cannot_see_is_found_or_stopped() {
         String::from_utf8_lossy(&output.stderr)
     );
     assert!(!said.contains("no mode grows"), "{said}");
-    match output.status.code() {
-        Some(1) => assert!(said.contains("unstable in time"), "{said}"),
-        Some(3) => assert!(said.contains("without work"), "{said}"),
-        other => panic!("{other:?}: {said}"),
-    }
-    let output = case.command("run", &["--set", "solve.explicit.growing-modes=warn"]);
     assert_eq!(output.status.code(), Some(3));
+    assert!(said.contains("without work"), "{said}");
     // what holds by construction is said as proved
     let truncated = case.command("check", &["--set", "coupling=truncated"]);
     let said = String::from_utf8_lossy(&truncated.stdout);

@@ -89,7 +89,7 @@ output = { vtu = false, probes.p = { at = [1.1, 0.9] } }
                 done.summary
                     .warnings
                     .iter()
-                    .all(|w| !w.contains("balance by"))
+                    .all(|w| !w.message.contains("balance by"))
             );
         }
     }

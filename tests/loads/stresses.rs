@@ -126,7 +126,8 @@ vtu = false
 
 /// The warning of a peak that falls off within a family, if there is one.
 fn told_of_a_peak(text: &str, overrides: &[&str]) -> Option<String> {
-    let mut texts = run(text, overrides).summary.warnings.into_iter();
+    let texts = run(text, overrides).summary.warnings.into_iter();
+    let mut texts = texts.map(|warning| warning.message);
     texts.find(|w| w.contains("falls off within a family"))
 }
 

@@ -162,7 +162,6 @@ box = { min = [3, 3], max = [7, 7] }
 duration = 630
 outputs = 4
 history-interval = 100
-growing-modes = "warn"
 [initial.spin.velocity]
 x = "-0.01*(y-5)"
 y = "0.01*(x-5)"

@@ -188,7 +188,6 @@ x = "0.09*(x-8)/8"
 [solve.explicit]
 duration = 0.6
 outputs = 1
-growing-modes = "warn"
 [output]
 vtu = false
 tips.t = { direction = [0, 1], threshold = 0.02 }

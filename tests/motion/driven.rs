@@ -231,7 +231,6 @@ y = "0.02*min(1,t/10)"
 duration = 20
 outputs = 2
 # a mode of this seam grows by exp(2.2) over the run: here two ways of keeping weights are compared, both with it
-growing-modes = "warn"
 "#;
     write(folder.path(), "notch.toml", scene);
     for precision in ["double", "single"] {

@@ -43,22 +43,21 @@ fn partial_stress_that_would_grow_is_refused_with_a_remedy_before_the_first_step
     assert_eq!(output.status.code(), Some(1));
     let said = String::from_utf8_lossy(&output.stderr).replace('│', " ");
     let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(said.contains("unstable in time at any step"), "{said}");
     assert!(said.contains("influence function P_n/|xi|"), "{said}");
     assert!(said.contains("use coupling.truncated"), "{said}");
+    assert!(said.contains("solver.unproven"), "{said}");
     let number = |before: &str| -> f64 {
         let rest = said.split_once(before).unwrap().1;
         let end = rest.find([' ', ')']).unwrap();
         rest[..end].parse().unwrap()
     };
-    // an eigenvalue below zero, the square of the rate, and a run long enough for powers of ten
-    let (rate, eigenvalue) = (number("grows as exp("), number("(eigenvalue "));
-    assert!(eigenvalue < -0.1, "{said}");
+    // a run long enough for powers of ten
+    let rate = number("grows as exp(");
+    assert!(rate > 0.316, "{said}");
     assert!(
-        (rate * rate + eigenvalue).abs() < 0.02 * rate * rate,
+        (number("by a factor of exp(") - 200.0 * rate).abs() < 0.1,
         "{said}"
     );
-    assert!((number("by exp(") - 200.0 * rate).abs() < 0.1, "{said}");
     // not one row of a history: nothing has moved
     assert!(!folder.path().join("out").exists());
 }
@@ -78,8 +77,5 @@ fn the_remedies_run() {
     let said = run(folder.path(), &[&["bar.toml"][..], &shorter].concat());
     // what is left grows too little to double the energy, and is told; the motion has so little of it that nothing is warned of
     assert!(said.contains("a mode grows by a factor of 1.0"), "{said}");
-    assert!(
-        !said.contains("warning: a mode of the seam grows"),
-        "{said}"
-    );
+    assert!(!said.contains("W17"), "{said}");
 }

@@ -257,10 +257,11 @@ fn a_contact_that_is_not_resolved_is_told() {
         let said = run(folder.path(), &["bar.toml", "--json"]);
         let summary: serde_json::Value = serde_json::from_str(&said).unwrap();
         let warnings = summary["warnings"].as_array().unwrap();
-        let of_impactor = |w: &&serde_json::Value| w.as_str().unwrap().contains("`punch`");
+        let of_impactor =
+            |w: &&serde_json::Value| w["message"].as_str().unwrap().contains("`punch`");
         let warning = warnings.iter().find(of_impactor);
         (
-            warning.map_or(String::new(), |w| w.as_str().unwrap().to_owned()),
+            warning.map_or(String::new(), |w| w["message"].as_str().unwrap().to_owned()),
             summary["motion"]["impactors"][0]["peak_sites"]
                 .as_u64()
                 .unwrap(),

@@ -263,7 +263,7 @@ fn bonds_of_a_position_aware_plate_break_and_its_energies_balance() {
 #[test]
 fn fitted_weights_move_as_they_rest_and_break() {
     // the splice grows by less than e over the run
-    let solve = STRUCK.to_owned() + "growing-modes = \"warn\"\n";
+    let solve = STRUCK.to_owned();
     let zone = "[zones]\ndamage-at-edge = \"warn\"\nnonlocal = { box = { min = [3, 1.5], max = [9, 4.5] } }\n[mesh.rect";
     for law in ["lps", "bond-based"] {
         let folder = tempfile::tempdir().unwrap();

@@ -214,7 +214,7 @@ fn a_coupled_plate_moves_slowly_as_it_rests_and_its_energies_balance() {
     // a stretch that is never reached: the pass over bonds, not the rows
     let fracture = "critical-stretch = 10";
     let ramp = "0.06*(1 - cos(pi*min(t, 2)/2))/2";
-    let solve = "[solve.explicit]\nduration = 2.2\noutputs = 1\nhistory-interval = 0.1\ngrowing-modes = \"warn\"\n";
+    let solve = "[solve.explicit]\nduration = 2.2\noutputs = 1\nhistory-interval = 0.1\n";
     let columns = [
         "right_reaction_x",
         "kinetic_energy",
@@ -261,7 +261,7 @@ fn a_coupled_plate_moves_slowly_as_it_rests_and_its_energies_balance() {
 #[test]
 fn a_slit_grows_in_a_blended_zone_as_it_does_in_points_alone() {
     let folder = tempfile::tempdir().unwrap();
-    let solve = "[solve.explicit]\nduration = 0.7\noutputs = 1\nhistory-interval = 0.02\nstep-fraction = 0.4\ngrowing-modes = \"warn\"\n";
+    let solve = "[solve.explicit]\nduration = 0.7\noutputs = 1\nhistory-interval = 0.02\nstep-fraction = 0.4\n";
     let columns = [
         "broken_bonds",
         "dissipated_energy",

@@ -57,11 +57,6 @@ fn inner_plate(material: &str, coupling: &str) -> String {
         ("duration = 10e-6", "duration = 5e-6"),
         ("-4e6", "-8e6"),
         ("y = 4e6", "y = 8e6"),
-        // splices and blendings of this plate have modes that grow slowly
-        (
-            "[solve.explicit]",
-            "[solve.explicit]\ngrowing-modes = \"warn\"",
-        ),
     ] {
         assert!(text.contains(old), "{old}");
         text = text.replace(old, new);
@@ -219,7 +214,6 @@ output.lines.axis = {{ from = [0, 1.4], to = [3.7, 1.6], samples = 9 }}
 duration = 0.3
 outputs = 2
 history-interval = 0.03
-growing-modes = "warn"
 {coupling}
 "#
     )
@@ -271,7 +265,6 @@ solver.unproven = "warn"
 duration = 0.6
 outputs = 2
 history-interval = 0.1
-growing-modes = "warn"
 "#;
     assert_same(text, &[1, 3]);
 }

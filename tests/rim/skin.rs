@@ -80,7 +80,7 @@ fn a_bore_that_nothing_breaks_is_one_of_elements() {
         // with points at the bore the error is told
         let told = |s: &Solution| {
             let mut all = s.summary().warnings.iter();
-            all.any(|w| w.contains("a uniform stress comes out wrong by"))
+            all.any(|w| w.message.contains("a uniform stress comes out wrong by"))
         };
         assert!(told(&without) && !told(&default));
     }

@@ -10,6 +10,7 @@ use bondline::observe::checkpoint::Pace;
 use bondline::observe::provenance::Program;
 use bondline::observe::report as tables;
 use bondline::observe::summary::Ended;
+use bondline::observe::warning::Code;
 use bondline::progress::Silent;
 use bondline::run::{AnyScene, RunOptions, StartFrom};
 use bondline::scene::{self, Template};
@@ -22,6 +23,7 @@ use clap::builder::PossibleValuesParser;
 use clap::{Parser, Subcommand, ValueEnum};
 
 use command::fields;
+use command::help::{EXAMPLES, TRADE};
 use command::interrupt::{self, INTERRUPTED};
 use command::threads::{self, Oversubscribe};
 use command::verify;
@@ -39,27 +41,6 @@ const WRONG: u8 = 1;
 /// Exit status of a run that stopped where damage reached the edge of the nonlocal zone.
 const AT_EDGE: u8 = 3;
 
-const EXAMPLES: &str = "Examples:
-  bondline new plate.toml                     write a commented scene to start from
-  bondline check plate.toml                   say what is wrong with it, and how large it is
-  bondline run plate.toml                     solve it and write out/plate.vtu for ParaView
-  bondline run plate.toml --set coupling=splice --set peridynamics.horizon=0.04
-  bondline run wave.toml --checkpoint-every 10min   a scene in time; Ctrl-C leaves a checkpoint
-  bondline run wave.toml --resume             go on where it stopped
-  bondline run plate.toml --json              the summary as JSON on standard output
-  bondline trade plate.toml                   what speed costs in accuracy: method, horizon, spacing, zone
-  bondline converge plate.toml --kind m       solve it on finer and finer lattices, and print orders
-  bondline schema > bondline.schema.json      completion and checks in an editor";
-
-const TRADE: &str = "The scene runs as it is, then with each setting of each knob alone, then with the combinations that promise most by what these showed.
-Every outcome is kept in the output folder: the same command goes on where the last one ended.
-
-Examples:
-  bondline trade plate.toml                                  all knobs, ten minutes
-  bondline trade plate.toml --knob coupling,m --budget 2min
-  bondline trade plate.toml --vary 'solver.tolerance=[1e-4, 1e-6]' --quantity displacement,strain
-  bondline trade glass.toml --quantity path.upper,tip-time.upper --wanted 0.02";
-
 /// Couples classical finite elements to meshfree peridynamics.
 #[derive(Parser)]
 #[command(name = "bondline", version = VERSION, after_help = EXAMPLES)]
@@ -74,7 +55,7 @@ enum Command {
     #[command(
         after_help = "Any key of the scene can be set: --set mesh.rectangle.x.cells=240, --set coupling=local, \
                             --set 'conditions.top.displacement.y=\"1e-3*x\"'. A choice that differs replaces the whole table.\n\n\
-                            Exit status: 0 done, 1 wrong or impossible, 2 wrong arguments, 3 stopped at a limit (damage at the edge of the nonlocal zone, energy gained without work, rotation), 4 memory exhausted, 130 interrupted."
+                            Exit status: 0 done, 1 wrong, impossible, or with a warning that the scene denies, 2 wrong arguments, 3 stopped at a limit (damage at the edge of the nonlocal zone, energy gained without work, rotation), 4 memory exhausted, 130 interrupted."
     )]
     Run {
         #[command(flatten)]
@@ -145,6 +126,11 @@ enum Command {
     Schema,
     /// List the fields of a solution that files and tables have, with their units and the keys that ask for them.
     Fields,
+    /// Explain a code of a warning: its cause, the meaning of its number, and what helps.
+    Explain {
+        /// The code, as messages have it: W32.
+        code: Code,
+    },
     /// Run a scene with its knobs turned, and show the cost of speed in accuracy.
     #[command(after_help = TRADE)]
     Trade(TradeArguments),
@@ -165,7 +151,11 @@ impl Command {
                 scene.memory
             }
             Self::Trade(arguments) => arguments.scene.memory,
-            Self::New { .. } | Self::Schema | Self::Fields | Self::Verify { .. } => None,
+            Self::New { .. }
+            | Self::Schema
+            | Self::Fields
+            | Self::Explain { .. }
+            | Self::Verify { .. } => None,
         }
     }
 }
@@ -367,12 +357,18 @@ fn run(
         Some(Ended::DamageAtEdge | Ended::EnergyGained | Ended::ElementsRotated) => AT_EDGE,
         Some(Ended::Interrupted) => INTERRUPTED,
     };
+    let is_denied = summary.warnings.iter().any(|warning| warning.denied);
     match (is_first, json) {
         (false, _) => {}
         (true, true) => print(summary.json().map_err(|e| miette::miette!("{e}"))?)?,
         (true, false) => print(&summary)?,
     }
-    Ok(code)
+    // a run that stopped has its own status
+    Ok(if is_denied && code == DONE {
+        WRONG
+    } else {
+        code
+    })
 }
 
 /// Predicts a run, and the part of it that each of several processes would have.
@@ -518,6 +514,11 @@ fn execute(command: Command, program: std::io::Result<PathBuf>) -> miette::Resul
             print(text.map_err(|e| miette::miette!("{e}"))?)?;
         }
         Command::Fields => print(fields::table())?,
+        Command::Explain { code } => print(format_args!(
+            "{code} {}\n\n{}",
+            code.title(),
+            code.explanation()
+        ))?,
         Command::Trade(arguments) => return traded(arguments, program),
         Command::Verify { arguments } => return verify::start(program, &arguments),
     }

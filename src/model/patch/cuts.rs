@@ -130,19 +130,22 @@ impl Cuts {
     }
 }
 
-/// The least mean of a shape function of a cell over what is left of it, over that in the whole cell.
+/// The least mean of a shape function of a cell, of one of second order those of its corners, over what is left of it, over that in the whole cell.
 fn least_mean<const D: usize>(mesh: &Mesh<D>, c: usize, rule: &CutCell) -> f64 {
     let (mut size, mut sums) = (0.0, [0.0; 8]);
-    let mut count = 0;
+    let count = mesh.corners(c).len();
+    let linear = fem::reference_cell(mesh.shapes[c].linear());
     for (xi, w) in &rule.mass {
-        let (shape, nodes) = fem::shape_values(mesh, c, &Vector::from_fn(|i, _| xi[i]));
-        count = nodes;
+        let shape = match linear.filter(|_| mesh.shapes[c].is_quadratic()) {
+            Some(linear) => (linear.values)(xi),
+            None => fem::shape_values(mesh, c, &Vector::from_fn(|i, _| xi[i])).0,
+        };
         size += w;
         sums.iter_mut()
             .zip(shape)
             .for_each(|(sum, n)| *sum += w * n);
     }
-    let least = sums[..count.min(8)].iter().copied();
+    let least = sums[..count].iter().copied();
     least.fold(f64::INFINITY, f64::min) * count as f64 / size
 }
 

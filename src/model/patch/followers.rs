@@ -6,7 +6,7 @@ use super::{
     cells::{GOOD, Index, PatchCells, block},
     cuts::Cuts,
     error::PatchError,
-    rows::{Place, Row, Rows, affine_row, gathered, row_of_cell},
+    rows::{Place, Row, Rows, gathered},
 };
 use crate::{mesh::Mesh, tensor::Vector};
 
@@ -17,12 +17,12 @@ const RINGS: usize = 12;
 const PASSES: usize = 200;
 
 /// The nodes of the mesh that follow, with those of the element that each follows: the one of the least sum of weights in the first ring of cells that has any, and in the next. It is of the `material` of what is left of their own, whose
-/// strain another one has not. Where nodes need masses (`has_masses`), weights are those of the corners.
+/// strain another one has not. The weights in a cell are those of `row_at`.
 pub(super) fn of_mesh<const D: usize>(
     mesh: &Mesh<D>,
     cuts: &Cuts,
     (is_held, material): (&dyn Fn(u32) -> bool, &dyn Fn(u32) -> u16),
-    has_masses: bool,
+    row_at: fn(&Mesh<D>, usize, &Vector<D>) -> Option<Row<D>>,
 ) -> Result<Rows<D>, PatchError> {
     let (offsets, around) = mesh.node_cells();
     let cells = |n: u32| &around[offsets[n as usize] as usize..offsets[n as usize + 1] as usize];
@@ -49,11 +49,9 @@ pub(super) fn of_mesh<const D: usize>(
             ring.sort_unstable();
             ring.dedup();
             for &c in ring.iter().filter(|&&c| may_lead(c)) {
-                let row = match has_masses {
-                    true => affine_row(mesh, c as usize, &x),
-                    false => row_of_cell(mesh, c as usize, &x),
+                let Some(row) = row_at(mesh, c as usize, &x) else {
+                    continue;
                 };
-                let Some(row) = row else { continue };
                 let sum: f64 = row.iter().map(|e| e.1.abs()).sum();
                 if best.as_ref().is_none_or(|b| sum < b.0) {
                     best = Some((sum, row));

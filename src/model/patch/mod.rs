@@ -55,7 +55,7 @@ use self::{
     cells::PatchCells,
     composite::Composite,
     cuts::Cuts,
-    rows::{Place, Rows},
+    rows::{Place, Rows, mass_row, row_of_cell},
     sides::Sides,
     tie::Tied,
 };
@@ -165,7 +165,7 @@ fn grown<const D: usize>(
     for _ in 0..ABSORBED {
         patch.check_materials(material)?;
         patch.check_connected(mesh)?;
-        let (cut, replaced) = replaced::replaced(mesh, &patch, lattice.has_masses);
+        let (cut, replaced) = replaced::replaced(mesh, &patch);
         let cuts = Cuts::new(cut.as_ref(), &patch, lattice.has_masses)?;
         let strips = match growth.takes_strips {
             true => cuts.strips(cut.as_ref(), &patch, is_held),
@@ -207,7 +207,12 @@ fn embedded<const D: usize>(
     }
     let sides = Sides::new(mesh, patch, cuts);
     let is_held = |n: u32| is_held(sides.origin(n));
-    let mut rows = followers::of_mesh(&sides.mesh, cuts, (&is_held, material), lattice.has_masses)?;
+    // masses and displacements by the same weights, or what accelerates strains cells: none of second order, which are negative in a cell too
+    let row_at = match lattice.has_masses {
+        true => mass_row,
+        false => row_of_cell,
+    };
+    let mut rows = followers::of_mesh(&sides.mesh, cuts, (&is_held, material), row_at)?;
     rows.extend(followers::of_rim(patch)?);
     let tied = tie::rows(&sides.mesh, patch, cuts);
     let mut all = rows.clone();

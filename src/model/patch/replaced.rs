@@ -1,7 +1,6 @@
 //! Cells that a patch replaces before it cuts: those of second order that it meets by ones with straight sides, and quadrilaterals and hexahedra by divided ones.
 //!
-//! Simplices with straight sides have polynomials for shape functions, so that the moments of what is left of them give their stiffness. They keep their order at rest; a body that moves needs a positive mass at each node, which linear cells have
-//! whatever is cut off. Other cells of second order become linear. The shape functions of general quadrilaterals and hexahedra are no polynomials in space. Divided about their middle they are linear in each part ([`crate::fem`], `divided.rs`), and neighbours that are whole stay as they are.
+//! Simplices with straight sides have polynomials for shape functions, so that the moments of what is left of them give their stiffness. They keep their order. Other cells of second order become linear. The shape functions of general quadrilaterals and hexahedra are no polynomials in space. Divided about their middle they are linear in each part ([`crate::fem`], `divided.rs`), and neighbours that are whole stay as they are.
 
 use std::borrow::Cow;
 
@@ -22,17 +21,16 @@ pub struct Replaced {
     pub divided: usize,
 }
 
-/// The mesh with what replaces cells that the patch meets; its nodes and cells keep their numbers. `has_masses` if every node needs a mass.
+/// The mesh with what replaces cells that the patch meets; its nodes and cells keep their numbers.
 pub(super) fn replaced<'m, const D: usize>(
     mesh: &'m Mesh<D>,
     patch: &PatchCells<D>,
-    has_masses: bool,
 ) -> (Cow<'m, Mesh<D>>, Replaced) {
     let mut found = Replaced::default();
     let mut mesh = Cow::Borrowed(mesh);
     let met = met(&mesh, patch);
     if mesh.has_quadratic_cells() {
-        straighten(mesh.to_mut(), &met, has_masses, &mut found);
+        straighten(mesh.to_mut(), &met, &mut found);
     }
     let divided = to_divide(&mesh, &met);
     if !divided.is_empty() {
@@ -73,12 +71,7 @@ fn met<const D: usize>(mesh: &Mesh<D>, patch: &PatchCells<D>) -> Vec<Option<Met>
 }
 
 /// Gives straight sides to cells of second order that the patch meets, and makes linear ones of those whose order is not kept.
-fn straighten<const D: usize>(
-    mesh: &mut Mesh<D>,
-    met: &[Option<Met>],
-    has_masses: bool,
-    found: &mut Replaced,
-) {
+fn straighten<const D: usize>(mesh: &mut Mesh<D>, met: &[Option<Met>], found: &mut Replaced) {
     let is_met: Vec<bool> = (0..mesh.cell_count())
         .map(|c| met[c].is_some() && mesh.shapes[c].is_quadratic())
         .collect();
@@ -95,7 +88,7 @@ fn straighten<const D: usize>(
     }
     let is_simplex = |shape| matches!(shape, CellShape::Line3 | CellShape::Tri6 | CellShape::Tet10);
     let is_linear: Vec<bool> = (is_met.iter().zip(&mesh.shapes))
-        .map(|(is_met, &shape)| *is_met && (has_masses || !is_simplex(shape)))
+        .map(|(is_met, &shape)| *is_met && !is_simplex(shape))
         .collect();
     found.linear = is_linear.iter().filter(|c| **c).count();
     mesh.linearise(|c| is_linear[c]);

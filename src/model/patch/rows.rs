@@ -52,17 +52,24 @@ pub(super) fn row_of_cell<const D: usize>(
     Some(nodes.zip(shape).collect())
 }
 
-/// As [`row_of_cell`], of a cell of second order those of its corners alone: others are negative inside of it too, and no weights of masses.
-pub(super) fn affine_row<const D: usize>(
-    mesh: &Mesh<D>,
-    c: usize,
-    x: &Vector<D>,
-) -> Option<Row<D>> {
+/// As [`row_of_cell`], for masses: of a cell of second order, whose shape functions are negative inside of it too, those of its corners, of which the nodes in the middle of edges take the same from both ends, as far as all are positive.
+/// They are exact for affine fields, and near what shape functions of second order make of a uniform force.
+pub(super) fn mass_row<const D: usize>(mesh: &Mesh<D>, c: usize, x: &Vector<D>) -> Option<Row<D>> {
     if !mesh.shapes[c].is_quadratic() {
         return row_of_cell(mesh, c, x);
     }
     let xi = fem::reference_of(mesh, c, x)?;
     let linear = fem::reference_cell(mesh.shapes[c].linear())?;
-    let nodes = mesh.corners(c).iter().map(|&n| Place::Mesh(n));
-    Some(nodes.zip((linear.values)(&padded(&xi))).collect())
+    let values = (linear.values)(&padded(&xi));
+    let corners = mesh.corners(c).len();
+    let mut weights = values[..corners].to_vec();
+    for &[a, b] in mesh.shapes[c].mid_sides() {
+        // as many edges meet in a corner as there are axes
+        let part = values[a].min(values[b]).max(0.0) / D as f64;
+        weights[a] -= part;
+        weights[b] -= part;
+        weights.push(2.0 * part);
+    }
+    let nodes = mesh.cell(c).iter().map(|&n| Place::Mesh(n));
+    Some(nodes.zip(weights).collect())
 }

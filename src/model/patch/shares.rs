@@ -9,12 +9,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::{
     cells::{Index, PatchCells, block},
     cuts::Cuts,
-    rows::{Place, Row, Rows, affine_row},
+    rows::{Place, Row, Rows, mass_row},
 };
 use crate::{mesh::Mesh, peridynamics::bounded_least_norm::positive_weights, tensor::Vector};
 
 /// Weight below which a row is extrapolated.
 const LEAST: f64 = -1e-9;
+
+/// Part of a mass that a corner of an element of second order has beside a node in the middle of an edge, as far as it may be chosen.
+const OF_CORNER: f64 = 0.05;
 
 /// Shape functions at a place, and the least of them.
 type Found<const D: usize> = (f64, Row<D>);
@@ -67,7 +70,7 @@ fn row_at<const D: usize>(
 ) -> Option<Found<D>> {
     let each = cells.iter().filter_map(|&c| {
         let c = c as usize;
-        let row = affine_row(mesh, c, x)?;
+        let row = mass_row(mesh, c, x)?;
         let least = row.iter().map(|e| e.1).fold(1.0, f64::min);
         Some((least, row))
     });
@@ -133,6 +136,15 @@ pub(super) fn make_positive<const D: usize>(
         found.retain(|place| !rows.contains_key(place));
         found
     };
+    // a uniform force on second-order cells leaves the corners free
+    let mut prior = vec![1.0; mesh.nodes.len()];
+    for c in (0..mesh.cell_count()).filter(|&c| mesh.shapes[c].is_quadratic()) {
+        (mesh.corners(c).iter()).for_each(|&n| prior[n as usize] = OF_CORNER);
+    }
+    let prior = |place: &Place<D>| match place {
+        Place::Mesh(n) => prior[*n as usize],
+        Place::Patch(_) => 1.0,
+    };
     let mut changed = Rows::new();
     for (place, row) in rows.iter() {
         if row.iter().all(|(_, w)| *w >= LEAST) {
@@ -146,7 +158,10 @@ pub(super) fn make_positive<const D: usize>(
         let arms: Vec<Vector<D>> = places.iter().map(|place| position(place) - x).collect();
         let reach = arms.iter().map(|arm| arm.norm()).fold(0.0, f64::max);
         let arms: Vec<Vector<D>> = arms.iter().map(|arm| arm / reach).collect();
-        let near: Vec<f64> = arms.iter().map(|arm| 1.01 - arm.norm_squared()).collect();
+        let near = |arm: &Vector<D>| 1.01 - arm.norm_squared();
+        let near: Vec<f64> = (arms.iter().zip(&places))
+            .map(|(arm, place)| near(arm) * prior(place))
+            .collect();
         if let Some(weights) = positive_weights(&arms, &near) {
             let row = places.into_iter().zip(weights).filter(|(_, w)| *w > 0.0);
             changed.insert(*place, row.collect());

@@ -7,6 +7,7 @@ use crate::contact::{ContactLaw, SurfaceContact, has_cracks};
 use crate::model::Model;
 use crate::observe::report::number;
 use crate::observe::summary::Decision;
+use crate::observe::warning::{Code, Warning};
 use crate::run::error::RunError;
 use crate::run::setup::RunSettings;
 use crate::solve::explicit::State;
@@ -217,16 +218,16 @@ impl<const D: usize> ContactRecord<D> {
     }
 
     /// Warns of surfaces that came in deep.
-    pub fn warnings(&self) -> Option<String> {
+    pub fn warnings(&self) -> Option<Warning> {
         let (part, place, time) = &self.deepest;
         let at: Vec<String> = place.iter().map(|x| number(*x)).collect();
         (*part > DEEP).then(|| {
-            format!(
+            Warning::new(Code::ContactDepth, format!(
                 "contact: at t = {} a surface lay {} of a cell inside another, at ({}) of the body at rest; beyond half a cell it passes through: multiply contact.stiffness-factor by four",
                 number(*time),
                 number(*part),
                 at.join(", ")
-            )
+            )).at(place.as_slice())
         })
     }
 }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::observe::report::number;
+use crate::observe::warning::{Code, Warning};
 use crate::solve::explicit::State;
 
 /// The largest growth of cracks between two rows so far.
@@ -48,23 +49,26 @@ impl CrackGrowth {
         &self,
         horizon: f64,
         [free, dissipated]: [f64; 2],
-    ) -> Option<String> {
+    ) -> Option<Warning> {
         let told = (HORIZONS * horizon).powi(D as i32 - 1);
         let in_one = D > 1 && self.largest > told && self.largest > SHARE * self.area;
         if !in_one {
             let has_run = self.area > 0.0 && self.area >= told;
             return (has_run && free > SET_FREE * dissipated).then(|| {
-                format!(
+                Warning::new(Code::CrackRan, format!(
                     "breaking set free {:.0} % of what it dissipated: the crack ran on within load steps, where bonds beside its path break too; its energy is then too large, and [solve.explicit] follows it",
                     100.0 * free / dissipated
-                )
+                ))
             });
         }
-        Some(format!(
-            "load step {}, t = {}, alone took {:.0} % of the crack: it ran on within the step, where bonds beside its path break too, so that its energy comes out too large, and the states in between are left out; smaller load steps tell whether the crack grows with the load, and [solve.explicit] follows one that runs by itself",
-            self.step,
-            number(self.time),
-            100.0 * self.largest / self.area,
+        Some(Warning::new(
+            Code::CrackRan,
+            format!(
+                "load step {}, t = {}, alone took {:.0} % of the crack: it ran on within the step, where bonds beside its path break too, so that its energy comes out too large, and the states in between are left out; smaller load steps tell whether the crack grows with the load, and [solve.explicit] follows one that runs by itself",
+                self.step,
+                number(self.time),
+                100.0 * self.largest / self.area,
+            ),
         ))
     }
 }
@@ -84,7 +88,7 @@ mod tests {
             };
             growth.watch(&state, *length);
         }
-        growth.warning::<2>(3.0, energies)
+        growth.warning::<2>(3.0, energies).map(|told| told.message)
     }
 
     #[test]

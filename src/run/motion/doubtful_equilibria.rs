@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::setup::ModelSetup;
 use crate::model::Model;
+use crate::observe::warning::Warning;
 use crate::run::balance::{Balance, furthest, round_off};
 use crate::run::condition_terms::ConditionTerms;
 use crate::run::setup::RunSettings;
@@ -28,7 +29,7 @@ pub(super) struct DoubtfulEquilibria<'a, const D: usize> {
     furthest: f64,
     /// True once a load step has been examined for its peak of stress.
     asked: bool,
-    steep: Vec<String>,
+    steep: Vec<Warning>,
 }
 
 impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
@@ -86,7 +87,7 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
     }
 
     /// The warnings.
-    pub fn told(self) -> impl Iterator<Item = String> {
+    pub fn told(self) -> impl Iterator<Item = Warning> {
         let Self { force, scale, .. } = self;
         let round_off = round_off(self.model, self.furthest);
         let relative = Balance { force, scale }.relative();

@@ -294,6 +294,7 @@ impl SegmentRecord {
             processes: motion.traffic().unwrap_or_default(),
             ..motion_summary(observer, motion, ended, energy_gain, self.taken)?
         };
+        told.extend(motion.edge_warning());
         Ok(RunSummary {
             scene: self.setup.title,
             dimension: D,

@@ -12,6 +12,7 @@ use super::seen::{Rotated, Seen};
 use super::writer::{EnergyRow, Moment};
 use crate::model::Model;
 use crate::observe::summary::{Ended, EnergyGain, Rotation};
+use crate::observe::warning::Warning;
 use crate::run::linear_parts::LinearParts;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
@@ -167,7 +168,7 @@ impl<'m, const D: usize> Guard<'m, D> {
     }
 
     /// Returns warnings of parts that are linear or whole beyond the range in which their material is, in a run that ends at a time.
-    pub fn passed(&self, time: f64) -> impl Iterator<Item = String> {
+    pub fn passed(&self, time: f64) -> impl Iterator<Item = Warning> {
         self.parts.told(&self.seen.passed, time)
     }
 

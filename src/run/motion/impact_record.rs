@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::coupling::{ContactPatch, Impact, ImpactorShape};
 use crate::observe::report::number;
 use crate::observe::summary::ImpactorSummary;
+use crate::observe::warning::{Code, Quantity, Warning};
 use crate::scene::impactors::Impactor;
 use crate::solve::explicit::State;
 use crate::tensor::{AXES, Vector};
@@ -116,24 +117,24 @@ impl<const D: usize> ImpactRecord<D> {
     }
 
     /// Warns of impactors that have not touched the body, and of round ones that so few sites touch that the peak of the force depends on where these lie.
-    pub fn warnings(&self) -> impl Iterator<Item = String> + '_ {
+    pub fn warnings(&self) -> impl Iterator<Item = Warning> + '_ {
         let impactors = self.impact.impactors().iter();
         let all = impactors.zip(&self.names).zip(&self.peaks);
         all.filter_map(|((impactor, name), peak)| {
             if peak.force == 0.0 {
-                return Some(format!(
+                return Some(Warning::new(Code::Impactor, format!(
                     "impactor `{name}` has not touched the body: look at where it begins, which way it moves, and how long the scene lasts"
-                ));
+                )));
             }
             let across = peak.contact.across;
             // a plane touches all of a face at once
             let is_round = D > 1 && !matches!(impactor.shape, ImpactorShape::Plane { .. });
-            let varies = if across < COARSE { "a third" } else { "a tenth" };
+            let (varies, part) = if across < COARSE { ("a third", 1.0 / 3.0) } else { ("a tenth", 0.1) };
             (is_round && across < RESOLVED).then(|| {
-                format!(
+                Warning::new(Code::Impactor, format!(
                     "impactor `{name}`: the contact was {} sites wide at the peak of its force, which may be wrong by {varies}, as nodes and points happen to lie; {RESOLVED} sites resolve it; the momentum that it transfers needs fewer",
                     number(across.round()),
-                )
+                )).of(Quantity::ContactForce, part)
             })
         })
     }

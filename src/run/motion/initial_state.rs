@@ -18,6 +18,7 @@ use crate::coupling::impact::RESOLVED;
 use crate::observe::checkpoint::CheckpointFile;
 use crate::observe::proof::Part;
 use crate::observe::summary::{Decision, Timings, bytes_text};
+use crate::observe::warning::Code;
 use crate::run::condition_terms::ConditionTerms;
 use crate::run::error::RunError;
 use crate::run::loads::BodyForces;
@@ -25,6 +26,7 @@ use crate::run::motion::seen::Seen;
 use crate::run::proof::growth::{GrowthQuestion, free_start};
 use crate::run::setup::RunSettings;
 use crate::scene::solve::Explicit as Spec;
+use crate::scene::spec::UnprovenSpec;
 use crate::solve::explicit::State;
 use crate::system::Dissipation;
 use crate::{
@@ -116,7 +118,8 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
         let asked = GrowthQuestion {
             remedy: self.setup.remedy,
             proved: self.proved,
-            policy: spec.growing_modes,
+            may_be_hopeless: rest.solver.unproven == UnprovenSpec::Warn,
+            denied: rest.warnings.denied.contains(&Code::Growth),
             place: &|site| model.sites[site].position.iter().copied().collect(),
             ranks: options.ranks,
             free_from: free_start((model, rest), moving.is_linear, &begin)?,

@@ -526,6 +526,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
                 .chain(self.rotation.as_ref().map(Rotation::warning))
                 .chain(self.parts.told(&self.seen.passed, state.time))
                 .chain(self.doubts.told())
+                .chain(motion.edge_warning())
                 .collect(),
             dimension: D,
             applied,

@@ -14,6 +14,7 @@ use super::writer::{EnergyRow, Moment, Recorder};
 use super::zone_monitor::{ZoneMonitor, fastest_crack};
 use crate::observe::ObserveError;
 use crate::observe::summary::{Ended, Timings};
+use crate::observe::warning::Warning;
 use crate::progress::Progress;
 use crate::run::error::RunError;
 use crate::run::field_probes::FieldProbes;
@@ -165,7 +166,7 @@ pub(super) struct StepObserver<'a, 'r, const D: usize> {
     pub edge: Option<EdgeReached>,
     pub zone: Option<SavedZone>,
     /// Warnings of steep stresses, from the first output that shows such.
-    pub steep: Vec<String>,
+    pub steep: Vec<Warning>,
     /// Reason for which the steps were left early.
     pub stop: Option<Stop>,
     /// True if a checkpoint was due with the change of the zone: of the state in the next layout.

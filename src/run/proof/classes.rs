@@ -2,6 +2,7 @@
 
 use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::observe::report::number;
+use crate::observe::warning::{Code, Quantity, Warning};
 
 /// Limits of this part of the proof; `docs/proof.md` has the measurements behind them.
 pub(super) mod limits {
@@ -106,33 +107,56 @@ pub(super) enum Skin {
 }
 
 impl Skin {
-    /// Returns the remedy for surfaces, in words.
-    fn remedy(self) -> &'static str {
+    /// Returns the remedy for surfaces.
+    fn remedy(self) -> Remedy {
         match self {
-            Self::Possible => {
-                "zones.skin = \"free-surfaces\" puts elements there, through which no crack comes"
-            }
-            Self::Crossed => {
-                "a crack or void passes through the cells there, which elements cannot carry; a smaller horizon makes the layer thinner"
-            }
-            Self::NoElements => {
-                "elements there (coupling = \"truncated\" and zones.skin = \"free-surfaces\") or a smaller horizon help"
-            }
+            Self::Possible => Remedy {
+                words: "zones.skin = \"free-surfaces\" puts elements there, through which no crack comes",
+                keys: &[&["zones.skin=free-surfaces"]],
+            },
+            Self::Crossed => Remedy::in_words(
+                "a crack or void passes through the cells there, which elements cannot carry; a smaller horizon makes the layer thinner",
+            ),
+            Self::NoElements => Remedy {
+                words: "elements there (coupling = \"truncated\" and zones.skin = \"free-surfaces\") or a smaller horizon help",
+                keys: &[&["coupling=truncated", "zones.skin=free-surfaces"]],
+            },
         }
     }
 
     /// As [`Skin::remedy`], where a seam meets the surface.
-    fn remedy_at_seam(self) -> &'static str {
+    fn remedy_at_seam(self) -> Remedy {
         match self {
-            Self::Possible | Self::NoElements => {
-                "zones.skin = \"free-surfaces\", or end the zones two horizons from the surface"
-            }
-            Self::Crossed => {
-                "a crack or void passes through the cells there, so that the zone has to end in the surface; a smaller horizon makes the layer thinner"
-            }
+            Self::Possible | Self::NoElements => Remedy {
+                words: "zones.skin = \"free-surfaces\", or end the zones two horizons from the surface",
+                keys: &[&["zones.skin=free-surfaces"]],
+            },
+            Self::Crossed => Remedy::in_words(
+                "a crack or void passes through the cells there, so that the zone has to end in the surface; a smaller horizon makes the layer thinner",
+            ),
         }
     }
 }
+
+/// A remedy in words, and what of it keys of a scene can do.
+#[derive(Clone, Copy, Debug)]
+struct Remedy {
+    words: &'static str,
+    /// Ways to choose from, each the values of `--set` that it takes.
+    keys: &'static [&'static [&'static str]],
+}
+
+impl Remedy {
+    const fn in_words(words: &'static str) -> Self {
+        Self { words, keys: &[] }
+    }
+}
+
+/// The coupling whose seam balances uniform stresses on any mesh.
+const TRUNCATED: Remedy = Remedy {
+    words: "use coupling.truncated",
+    keys: &[&["coupling=truncated"]],
+};
 
 /// Properties of a model that decide which remedies there are.
 #[derive(Clone, Copy, Debug)]
@@ -207,7 +231,7 @@ impl RowClass {
 }
 
 /// Returns the place of the rows of a class, the remedy, and the errors from which on they are warned of and refused; none of rows at cracks, voids and borders of materials.
-fn described(class: RowClass, layout: Layout) -> Option<(&'static str, &'static str, [f64; 2])> {
+fn described(class: RowClass, layout: Layout) -> Option<(&'static str, Remedy, [f64; 2])> {
     let Layout {
         is_lattice,
         is_truncated,
@@ -216,32 +240,36 @@ fn described(class: RowClass, layout: Layout) -> Option<(&'static str, &'static 
     Some(match class {
         RowClass::Seam if is_lattice && is_truncated => (
             "at the seam",
-            "leave peridynamics.points out, whose lattice follows the mesh, or make the elements beside the zone no larger than two spacings",
+            Remedy::in_words(
+                "leave peridynamics.points out, whose lattice follows the mesh, or make the elements beside the zone no larger than two spacings",
+            ),
             [limits::WARN, limits::REFUSE],
         ),
         RowClass::Seam if is_truncated => (
             "at the seam",
-            "give peridynamics.points a lattice",
+            Remedy::in_words("give peridynamics.points a lattice"),
             [limits::WARN, limits::REFUSE],
         ),
-        RowClass::Seam if is_lattice => (
-            "at the seam",
-            "use coupling.truncated",
-            [limits::WARN, limits::REFUSE],
-        ),
+        RowClass::Seam if is_lattice => ("at the seam", TRUNCATED, [limits::WARN, limits::REFUSE]),
         RowClass::Points if is_lattice => (
             "among the points",
-            "leave peridynamics.weights out: isotropic ones carry the constants typed",
+            Remedy {
+                words: "leave peridynamics.weights out: isotropic ones carry the constants typed",
+                keys: &[&["peridynamics.weights=isotropic"]],
+            },
             [limits::WARN, limits::REFUSE],
         ),
         RowClass::Seam => (
             "at the seam",
-            "give peridynamics.points a lattice, or use coupling.truncated",
+            Remedy {
+                words: "give peridynamics.points a lattice, or use coupling.truncated",
+                keys: TRUNCATED.keys,
+            },
             [limits::WARN, limits::REFUSE],
         ),
         RowClass::Points => (
             "among the points, which are no lattice,",
-            "give peridynamics.points a lattice",
+            Remedy::in_words("give peridynamics.points a lattice"),
             [limits::WARN, limits::REFUSE],
         ),
         RowClass::SeamAtSurface => (
@@ -251,7 +279,10 @@ fn described(class: RowClass, layout: Layout) -> Option<(&'static str, &'static 
         ),
         RowClass::Transition => (
             "where the transition zone meets the surface of the body, which its rows know nothing of,",
-            "end the transition zone two horizons from the surface, or use coupling.truncated",
+            Remedy {
+                words: "end the transition zone two horizons from the surface, or use coupling.truncated",
+                keys: TRUNCATED.keys,
+            },
             [limits::WARN_TRANSITION, limits::REFUSE_TRANSITION],
         ),
         RowClass::FreeSurface | RowClass::LoadedSurface => (
@@ -268,50 +299,68 @@ fn described(class: RowClass, layout: Layout) -> Option<(&'static str, &'static 
     })
 }
 
+impl Remedy {
+    /// The warning of rows with it, at a place with the predicted error of the stress there.
+    fn warning(
+        &self,
+        is_surface: bool,
+        (place, effect): (&[f64], Option<f64>),
+        message: String,
+    ) -> Warning {
+        let code = match is_surface {
+            true => Code::SurfaceStress,
+            false => Code::SeamStress,
+        };
+        let values = |keys: &&[&str]| keys.iter().map(|&key| key.to_owned()).collect();
+        Warning {
+            remedies: self.keys.iter().map(values).collect(),
+            ..Warning::new(code, message)
+                .of(Quantity::Stress, effect)
+                .at(place)
+        }
+    }
+}
+
 /// Returns the finding on a class of rows, if there is one.
 fn verdict(rows: &Unbalanced, layout: Layout) -> Option<Finding> {
-    let place = |x: &[f64]| {
-        let x: Vec<String> = x.iter().map(|x| format!("{x:.4e}")).collect();
-        format!("({})", x.join(", "))
-    };
     let (what, remedy, [warn, refuse]) = described(rows.class, layout)?;
     let is_surface = !matches!(rows.class, RowClass::Seam | RowClass::Points);
     if rows.residual < limits::NEGLIGIBLE {
         return None;
     }
+    let place = |x: &[f64]| {
+        let x: Vec<String> = x.iter().map(|x| format!("{x:.4e}")).collect();
+        format!("({})", x.join(", "))
+    };
+    // a residual whose effect is not known
+    let unknown = |limit: f64, why: &str, more: &str| {
+        Finding {
+        severity: Severity::Warning,
+        value: rows.residual,
+        limit,
+        warning: remedy.warning(
+            is_surface,
+            (&rows.at, None),
+            format!(
+                "a uniform stress is out of balance {what} by {} of it per spacing near {}; {why}{}{more}",
+                number(rows.residual),
+                place(&rows.at),
+                remedy.words
+            ),
+        ),
+    }
+    };
     if rows.is_unpredictable && is_surface && rows.residual >= warn {
-        let smaller = match remedy.contains("smaller horizon") {
+        let smaller = match remedy.words.contains("smaller horizon") {
             true => "",
             false => ", or take a smaller horizon",
         };
-        return Some(Finding {
-            severity: Severity::Warning,
-            place: rows.at.clone(),
-            value: rows.residual,
-            limit: warn,
-            message: format!(
-                "a uniform stress is out of balance {what} by {} of it per spacing near {}; the error of the stress there cannot be predicted, as in a body thinner than two horizons; {remedy}{smaller}",
-                number(rows.residual),
-                place(&rows.at)
-            ),
-        });
+        let why = "the error of the stress there cannot be predicted, as in a body thinner than two horizons; ";
+        return Some(unknown(warn, why, smaller));
     }
     let Some(error) = rows.stress_error else {
-        // where another class speaks for it
-        if is_surface {
-            return None;
-        }
-        return Some(Finding {
-            severity: Severity::Warning,
-            place: rows.at.clone(),
-            value: rows.residual,
-            limit: limits::EXACT,
-            message: format!(
-                "a uniform stress is out of balance {what} by {} of it per spacing near {}; {remedy}",
-                number(rows.residual),
-                place(&rows.at)
-            ),
-        });
+        // at a surface another class speaks for it
+        return (!is_surface).then(|| unknown(limits::EXACT, "", ""));
     };
     if error.abs() < warn {
         return None;
@@ -323,13 +372,17 @@ fn verdict(rows: &Unbalanced, layout: Layout) -> Option<Finding> {
     };
     Some(Finding {
         severity,
-        place: rows.stress_at.clone(),
         value: error,
         limit,
-        message: format!(
-            "a uniform stress comes out wrong by {:+.1} % of it {what} near {}; {remedy}",
-            100.0 * error,
-            place(&rows.stress_at)
+        warning: remedy.warning(
+            is_surface,
+            (&rows.stress_at, Some(error)),
+            format!(
+                "a uniform stress comes out wrong by {:+.1} % of it {what} near {}; {}",
+                100.0 * error,
+                place(&rows.stress_at),
+                remedy.words
+            ),
         ),
     })
 }

@@ -4,18 +4,17 @@
 
 use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::observe::report::number;
+use crate::observe::warning::{Code, Warning};
 use crate::progress::Progress;
 use crate::run::definiteness::factorised;
 use crate::run::error::RunError;
 use crate::run::loads::supports;
 use crate::run::setup::RunSettings;
 use crate::scene::conditions::{Condition, Prescribed};
-use crate::scene::spec::{CouplingSpec, GrowingModesSpec};
+use crate::scene::spec::CouplingSpec;
 use crate::solve::explicit::State;
 use crate::solve::growth_from_start::energy_gained;
-use crate::solve::instability_growth::{
-    Evidence, Growth, LARGEST_GAIN, REMEDY, REMEDY_SEAM, growth,
-};
+use crate::solve::instability_growth::{Evidence, Growth, REMEDY, REMEDY_SEAM, growth};
 use crate::system::{Ranks, SemiDiscrete, Symmetry};
 use crate::{
     coupling::{Definiteness, Operator},
@@ -28,14 +27,17 @@ const UNSEEN: f64 = 1.1;
 /// Growth by less than `exp` of this over a run is reported as none: rounding makes as much of double eigenvalues.
 const LEAST: f64 = 1e-3;
 
-/// The growth exponent from which on a growing mode is warned of: it gains 1 % of energy.
-const TOLD: f64 = 0.005;
+/// The growth exponent from which on modes that grow are sought in the start of a motion: they gain 1 % of their energy.
+const SOUGHT: f64 = 0.005;
 
 /// Energy of growing modes, over that of a free motion at its start, from which on the motion is warned of.
 const GAINED: f64 = 0.01;
 
-/// The same, from which on a run is refused: the watch on its energy would stop it.
-const STOPPED: f64 = 0.1;
+/// Part of a motion that a mode shows with: 1 %.
+const SHOWN: f64 = 0.01;
+
+/// Part of a motion that a mode of the seam may have to begin with: of smooth motions it is less.
+const PRESENT: f64 = 1e-3;
 
 /// Data for the search for growing modes before a run.
 #[derive(Clone, Copy)]
@@ -44,8 +46,10 @@ pub struct GrowthQuestion<'a> {
     pub remedy: &'static str,
     /// Evidence that no mode grows, if there is any.
     pub proved: Option<&'static str>,
-    /// Policy for a run in which one does.
-    pub policy: GrowingModesSpec,
+    /// True if the scene does not accept one that does.
+    pub denied: bool,
+    /// True if it may begin even where round-off will stop it in the first half of the run.
+    pub may_be_hopeless: bool,
     /// Position of a site.
     pub place: &'a dyn Fn(usize) -> Vec<f64>,
     /// The processes that ask together.
@@ -157,7 +161,7 @@ fn gained(
     held: &[u32],
     (step, steps): (f64, u64),
 ) -> Result<Option<f64>, RunError> {
-    let grows = found.rate * steps as f64 * step > TOLD;
+    let grows = found.rate * steps as f64 * step > SOUGHT;
     match (asked.free_from, asked.ranks, found.evidence) {
         (Some(start), None, Evidence::Eigenvalues) if grows => {
             Ok(energy_gained(system, held, (step, steps), start)?)
@@ -169,7 +173,7 @@ fn gained(
 /// Collective: looks for modes that grow over a run of `steps` steps of `step`; at most a tenth of its products, and at least 200.
 ///
 /// # Errors
-/// [`RunError::Grows`] for a mode that doubles its energy over the run, or for growing modes that end with more than [`STOPPED`] of the energy of a free motion, unless the scene wants a warning only.
+/// [`RunError::Denied`] for a mode of which is warned, in a scene that denies it, and [`RunError::Unproven`] for one that shows from round-off in the first half of the run.
 pub(crate) fn check(
     asked: &GrowthQuestion<'_>,
     system: &dyn SemiDiscrete,
@@ -196,17 +200,6 @@ pub(crate) fn check(
         Vec::new()
     };
     let gained = gained(asked, &found, system, held, (step, steps))?;
-    let is_refused = gained.map_or(exponent > LARGEST_GAIN, |gained| gained > STOPPED);
-    if is_refused && asked.policy == GrowingModesSpec::Refuse {
-        return Err(RunError::Grows {
-            place,
-            rate: found.rate,
-            gain: exponent,
-            real: found.eigenvalue[0],
-            imaginary: found.eigenvalue[1],
-            remedy: asked.remedy,
-        });
-    }
     let of_this_motion = gained.map_or(String::new(), |gained| {
         format!(
             "; the motion begins with so little of such modes that they end with at most {} of its energy",
@@ -214,21 +207,10 @@ pub(crate) fn check(
         )
     });
     let line = line_of(&found, exponent, unseen, &place) + &of_this_motion;
-    let mut findings = Vec::new();
-    if gained.map_or(exponent > TOLD, |gained| gained > GAINED) {
-        findings.push(Finding {
-            severity: Severity::Warning,
-            value: exponent.exp(),
-            limit: TOLD.exp(),
-            message: format!(
-                "a mode of the seam grows by a factor of {} over the run, largest at ({}): {}",
-                factor(exponent),
-                coordinates(&place),
-                asked.remedy
-            ),
-            place,
-        });
-    }
+    let is_told = gained.map_or(exponent > shows_from(PRESENT), |gained| gained > GAINED);
+    let finding = is_told
+        .then(|| finding(asked, &found, exponent, place))
+        .transpose()?;
     let figure = |name: &str, value: f64| Figure {
         name: name.to_owned(),
         value,
@@ -243,8 +225,47 @@ pub(crate) fn check(
             figure("exponent that would not show", unseen),
             figure("products", found.products as f64),
         ],
-        findings,
+        findings: finding.into_iter().collect(),
     })
+}
+
+/// Logarithm of the factor by which a mode grows from a part of the motion until it shows.
+fn shows_from(part: f64) -> f64 {
+    (SHOWN / part).ln()
+}
+
+/// The finding on a mode that grows by `exp(exponent)` over the run.
+fn finding(
+    asked: &GrowthQuestion<'_>,
+    found: &Growth,
+    exponent: f64,
+    place: Vec<f64>,
+) -> Result<Finding, RunError> {
+    let message = format!(
+        "a mode of the seam grows as exp({} t), by a factor of {} over the run, largest at ({}): begun as a thousandth of the motion it is a hundredth at t = {}, from round-off at t = {}; the run stops where energy gained without work passes solve.explicit.largest-energy-gain; {}",
+        number(found.rate),
+        factor(exponent),
+        coordinates(&place),
+        number(shows_from(PRESENT) / found.rate),
+        number(shows_from(f64::EPSILON) / found.rate),
+        asked.remedy
+    );
+    if exponent > 2.0 * shows_from(f64::EPSILON) && !asked.may_be_hopeless {
+        return Err(RunError::Unproven { message, place });
+    }
+    let warning = Warning {
+        denied: asked.denied,
+        ..Warning::new(Code::Growth, message).at(place)
+    };
+    match asked.denied {
+        true => Err(RunError::Denied(Box::new(warning))),
+        false => Ok(Finding {
+            severity: Severity::Warning,
+            value: exponent.exp(),
+            limit: shows_from(PRESENT).exp(),
+            warning,
+        }),
+    }
 }
 
 /// Name of the part.

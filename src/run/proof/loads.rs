@@ -15,6 +15,7 @@ use crate::model::tributary::Moments;
 use crate::model::{CellRole, Model, Zone};
 use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::observe::report::number;
+use crate::observe::warning::{Code, Quantity, Warning};
 use crate::run::error::RunError;
 use crate::run::loads::{BodyForces, Loads, nearest_points, site_of_node};
 use crate::scene::Expression;
@@ -245,19 +246,27 @@ fn compare<const D: usize>(
         };
         part.findings.push(Finding {
             severity,
-            place: place.iter().copied().collect(),
             value: worst,
             limit,
-            message: format!(
-                "the sites of the model carry {} of the {what} `{name}` instead of {} (relative difference of the total {}, of the first moment {}): let the nonlocal zone be at least two points wide wherever it is loaded, or move peridynamics.points.lattice.origin",
-                sizes(&own.force),
-                sizes(&exact.moments.force),
-                number(total),
-                number(moment),
-            ),
+            warning: lost(
+                format!(
+                    "the sites of the model carry {} of the {what} `{name}` instead of {} (relative difference of the total {}, of the first moment {}): let the nonlocal zone be at least two points wide wherever it is loaded, or move peridynamics.points.lattice.origin",
+                    sizes(&own.force),
+                    sizes(&exact.moments.force),
+                    number(total),
+                    number(moment),
+                ),
+                worst,
+            )
+            .at(place.as_slice()),
         });
     }
     worst
+}
+
+/// A part of a load or of a mass that no site carries, relative to it.
+fn lost(message: String, part: f64) -> Warning {
+    Warning::new(Code::Load, message).of(Quantity::Load, part)
 }
 
 fn sizes<const D: usize>(force: &Vector<D>) -> String {
@@ -319,14 +328,16 @@ fn mass<const D: usize>(model: &Model<D>, density: &[f64], part: &mut Part) -> (
     if worst > EXACT {
         part.findings.push(Finding {
             severity: if worst > LOST { Severity::Refusal } else { Severity::Warning },
-            place: Vec::new(),
             value: worst,
             limit: EXACT,
-            message: format!(
-                "the sites of the model have the mass {} instead of {} (first moment off by {}, relative): make the nonlocal zone at least two points wide, or move peridynamics.points.lattice.origin",
-                number(own),
-                number(exact),
-                number(first)
+            warning: lost(
+                format!(
+                    "the sites of the model have the mass {} instead of {} (first moment off by {}, relative): make the nonlocal zone at least two points wide, or move peridynamics.points.lattice.origin",
+                    number(own),
+                    number(exact),
+                    number(first)
+                ),
+                worst,
             ),
         });
     }
@@ -351,14 +362,17 @@ fn without_mass<const D: usize>(
     let x = &model.sites[at].position;
     part.findings.push(Finding {
         severity: Severity::Refusal,
-        place: x.iter().copied().collect(),
         value: least,
         limit: 0.0,
-        message: format!(
-            "the site at {} stands for the mass {}: the lattice of points and the surface of the nonlocal zone leave it none; move peridynamics.points.lattice.origin or refine the lattice",
-            sizes(x),
-            number(least)
-        ),
+        warning: Warning::new(
+            Code::Load,
+            format!(
+                "the site at {} stands for the mass {}: the lattice of points and the surface of the nonlocal zone leave it none; move peridynamics.points.lattice.origin or refine the lattice",
+                sizes(x),
+                number(least)
+            ),
+        )
+        .at(x.as_slice()),
     });
 }
 
@@ -394,15 +408,19 @@ fn unbalanced<const D: usize>(model: &Model<D>, condition: &Condition<D>) -> Opt
     let place = nodes.sum::<Vector<D>>() / first.nodes.len() as f64;
     Some(Finding {
         severity: Severity::Refusal,
-        place: place.iter().copied().collect(),
         value: share,
         limit: 0.0,
-        message: format!(
-            "`{}` acts where the coupling mixes both models, on {:.0} % of its surface, first at {}: the rows there are equations at a place and know of no surface, so that a part of the force is lost; keep the transition zone, and the collar of one horizon around it, off that surface, or couple by truncated",
-            condition.name,
-            100.0 * share,
-            sizes(&place)
-        ),
+        warning: Warning::new(
+            Code::Load,
+            format!(
+                "`{}` acts where the coupling mixes both models, on {:.0} % of its surface, first at {}: the rows there are equations at a place and know of no surface, so that a part of the force is lost; keep the transition zone, and the collar of one horizon around it, off that surface, or couple by truncated",
+                condition.name,
+                100.0 * share,
+                sizes(&place)
+            ),
+        )
+        .at(place.as_slice())
+        .remedy(["coupling=truncated"]),
     })
 }
 
@@ -447,14 +465,17 @@ fn supports<const D: usize>(
         if gap > FAR {
             part.findings.push(Finding {
                 severity: Severity::Warning,
-                place: worst.0.iter().copied().collect(),
                 value: gap,
                 limit: FAR,
-                message: format!(
-                    "the points that `{}` holds lie up to {gap:.2} spacings inside of its face, at {}: what is prescribed acts there, on a body that much shorter; move peridynamics.points.lattice.origin so that points lie on the face",
-                    c.name,
-                    sizes(&worst.0)
-                ),
+                warning: Warning::new(
+                    Code::Support,
+                    format!(
+                        "the points that `{}` holds lie up to {gap:.2} spacings inside of its face, at {}: what is prescribed acts there, on a body that much shorter; move peridynamics.points.lattice.origin so that points lie on the face",
+                        c.name,
+                        sizes(&worst.0)
+                    ),
+                )
+                .at(worst.0.as_slice()),
             });
         }
     }

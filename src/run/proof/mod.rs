@@ -74,20 +74,29 @@ pub fn prove<const D: usize>(
         let findings = proof.parts.iter_mut().flat_map(|p| &mut p.findings);
         findings.for_each(|f| f.severity = Severity::Warning);
     }
+    let denied = &subject.rest.warnings.denied;
+    for finding in proof.parts.iter_mut().flat_map(|p| &mut p.findings) {
+        if denied.contains(&finding.warning.code) {
+            (finding.severity, finding.warning.denied) = (Severity::Refusal, true);
+        }
+    }
     Ok(proof)
 }
 
 /// Refuses a model for which the proof does not hold.
 ///
 /// # Errors
-/// [`RunError::Unproven`] with the first refusal.
+/// [`RunError::Unproven`] with the first refusal, [`RunError::Denied`] for a warning that the scene denies.
 pub fn hold(proof: &Proof) -> Result<(), RunError> {
     let findings = proof.parts.iter().flat_map(|p| &p.findings);
     let mut refusals = findings.filter(|f| f.severity == Severity::Refusal);
     match refusals.next() {
+        Some(refusal) if refusal.warning.denied => {
+            Err(RunError::Denied(Box::new(refusal.warning.clone())))
+        }
         Some(refusal) => Err(RunError::Unproven {
-            message: refusal.message.clone(),
-            place: refusal.place.clone(),
+            message: refusal.warning.message.clone(),
+            place: refusal.warning.place.clone(),
         }),
         None => Ok(()),
     }

@@ -7,6 +7,7 @@
 use super::Subject;
 use crate::model::{CellRole, PointSource, SiteKind};
 use crate::observe::proof::{Figure, Finding, Part, Severity};
+use crate::observe::warning::{Code, Warning};
 use crate::peridynamics::PdBody;
 use crate::run::error::RunError;
 use crate::tensor::{Tensor, Tensor4, Vector};
@@ -73,7 +74,7 @@ fn finding(predicted: f64, place: Vec<f64>) -> Finding {
         severity,
         value: predicted,
         limit,
-        message: format!(
+        warning: Warning::new(Code::SeamGradient, format!(
             "the seam errs under quadratic fields, most at ({}): where the strain varies across the nonlocal zone, about {:.0} % of that change is wrong, and halves with the horizon only; use elements as small as the spacing of the points there, put a point of the lattice on a corner of the mesh, or use coupling.truncated",
             place
                 .iter()
@@ -81,8 +82,9 @@ fn finding(predicted: f64, place: Vec<f64>) -> Finding {
                 .collect::<Vec<_>>()
                 .join(", "),
             100.0 * predicted
-        ),
-        place,
+        ))
+        .at(place)
+        .remedy(["coupling=truncated"]),
     }
 }
 
@@ -324,11 +326,12 @@ fn small_stress_elements<const D: usize>(subject: &Subject<'_, D>) -> Option<Fin
         },
         value,
         limit: SMOOTH,
-        message: format!(
+        warning: Warning::new(Code::SeamGradient, format!(
             "elements that carry the partial stress are {value:.2} spacings of the points wide (at {}), and the lattice lies between their nodes: their strains may alternate, and displacements be wrong by any amount; use elements of two spacings there, put the lattice on their nodes, or use coupling.splice",
             place.iter().map(|x| format!("{x:.4}")).collect::<Vec<_>>().join(", ")
-        ),
-        place,
+        ))
+        .at(place)
+        .remedy(["coupling=splice"]),
     })
 }
 

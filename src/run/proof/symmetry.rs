@@ -3,6 +3,7 @@
 use super::Subject;
 use crate::observe::proof::{Figure, Finding, Part, Severity};
 use crate::observe::report::number;
+use crate::observe::warning::{Code, Warning};
 use crate::peridynamics::bond_force::Storage;
 use crate::system::Symmetry;
 
@@ -40,12 +41,14 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Option<Part> {
     };
     let broken = (asymmetry.is_nan() || asymmetry > limit).then(|| Finding {
         severity: Severity::Warning,
-        place: Vec::new(),
         value: asymmetry,
         limit,
-        message: format!(
-            "the stiffness differs from its transpose by about {} of itself although the coupling is a symmetric one: bonds of its two ends differ, since the horizon or the weights vary; there is no energy that the model conserves; use one horizon, or coupling.partial-stress with a varying one",
-            number(asymmetry)
+        warning: Warning::new(
+            Code::Asymmetry,
+            format!(
+                "the stiffness differs from its transpose by about {} of itself although the coupling is a symmetric one: bonds of its two ends differ, since the horizon or the weights vary; there is no energy that the model conserves; use one horizon, or coupling.partial-stress with a varying one",
+                number(asymmetry)
+            ),
         ),
     });
     Some(Part {

@@ -8,6 +8,7 @@ use toml::Spanned;
 
 use super::motion::TipSpec;
 use super::region::ShapeSpec;
+use crate::observe::warning::{Code, Policy};
 use crate::scene::value::{Coordinates, Count, Number, Text};
 use crate::solve::ordering::Ordering;
 use crate::solve::statics::Method;
@@ -40,6 +41,28 @@ pub enum UnprovenSpec {
     Refuse,
     /// It is solved, with a warning.
     Warn,
+}
+
+/// Kinds of warnings by their codes, which `docs/manual/warnings.md` explains: `["W32"]`.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct WarningsSpec {
+    /// Kinds that are left out. None if left out.
+    #[serde(default)]
+    pub allow: Vec<Code>,
+    /// Kinds that are refused: before the run where they are known by then, by its exit status else. None if left out.
+    #[serde(default)]
+    pub deny: Vec<Code>,
+}
+
+impl WarningsSpec {
+    /// What becomes of warnings.
+    pub(crate) fn policy(&self) -> Policy {
+        Policy {
+            allowed: self.allow.clone(),
+            denied: self.deny.clone(),
+        }
+    }
 }
 
 /// Output files: folder, names and content.

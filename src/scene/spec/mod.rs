@@ -33,7 +33,7 @@ pub use super::coupling_kinds::{
 pub use condition::{TemperatureSpec, VoidSpec};
 pub use control::{
     LineSpec, OutputSpec, PointOutputSpec, ProbeSpec, SectionSpec, SolverSpec, StressSpec,
-    UnprovenSpec,
+    UnprovenSpec, WarningsSpec,
 };
 pub use impactor::{CylinderSpec, ImpactorMotionSpec, ImpactorSpec, PlaneSpec, SphereSpec};
 pub use influence::{InfluenceSpec, MicromodulusSpec, PolynomialSpec};
@@ -44,9 +44,8 @@ pub use mesh::{
     PlaneCellSpec, RectangleMeshSpec, SolidCellSpec,
 };
 pub use motion::{
-    BeyondLimitSpec, CalibrationSpec, ContactSpec, ElementsSpec, ExplicitSpec, GrowingModesSpec,
-    InitialFieldSpec, InitialSpec, LoadStepSpec, NoOptionsSpec, QuasiStaticSpec, SolveSpec,
-    TipSpec, WhenPartedSpec,
+    BeyondLimitSpec, CalibrationSpec, ContactSpec, ElementsSpec, ExplicitSpec, InitialFieldSpec,
+    InitialSpec, LoadStepSpec, NoOptionsSpec, QuasiStaticSpec, SolveSpec, TipSpec, WhenPartedSpec,
 };
 pub use named_law::Given;
 pub use region::{
@@ -135,6 +134,9 @@ pub struct SceneSpec {
     /// Output files: folder, names and content.
     #[serde(default)]
     pub output: OutputSpec,
+    /// Kinds of warnings that are left out, or with which a run counts as failed.
+    #[serde(default)]
+    pub warnings: WarningsSpec,
 }
 
 impl SceneSpec {

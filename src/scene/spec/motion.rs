@@ -40,9 +40,6 @@ pub struct ExplicitSpec {
     pub beyond_limit: BeyondLimitSpec,
     /// Steps that the stiffest sites take in each step of all others; 1 if left out.
     pub sub_steps: Option<Count>,
-    /// Treatment of a run in which a mode doubles the energy; "refuse" if left out.
-    #[serde(default)]
-    pub growing_modes: GrowingModesSpec,
     /// Energy gained without work, as a part of the largest energy, at which the run stops; 0.1 if left out.
     pub largest_energy_gain: Option<Number>,
     /// Rotation of an element in degrees at which the run stops; none if left out.
@@ -66,17 +63,6 @@ pub enum BeyondLimitSpec {
     Refuse,
     /// The step is shortened to the fraction of the stable one.
     Shorten,
-}
-
-/// Treatment of a run in which a mode of the coupled model doubles the energy.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum GrowingModesSpec {
-    /// It does not begin.
-    #[default]
-    Refuse,
-    /// It begins with a warning.
-    Warn,
 }
 
 /// States of equilibrium under a load that grows step by step.

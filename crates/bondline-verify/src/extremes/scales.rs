@@ -2,7 +2,7 @@
 
 use super::{
     body::{Body, METHODS, Solved, moved},
-    kept, refused,
+    kept,
 };
 use crate::Effort;
 use bondline::{
@@ -163,14 +163,6 @@ pub(super) fn exact(_: Effort) -> Vec<TableRow> {
             off(stretched("exact"), stretched("linear")),
             UNITS_LIMIT,
         ));
-        if *coupling == "partial-stress" {
-            rows.push(refused(
-                "2D partial-stress, exact bonds, in motion",
-                free(coupling, "exact", &pulse(1e-3), 0.5).map(|m| m.stored_energy),
-                &["unstable in time"],
-            ));
-            continue;
-        }
         let small = stored(free(coupling, "exact", &pulse(tiny), 0.5)).map(|e| e / tiny.powi(2));
         let linear = stored(free(coupling, "linear", &pulse(1e-3), 0.5)).map(|e| e * 1e6);
         rows.push(kept(

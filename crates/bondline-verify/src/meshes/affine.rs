@@ -351,9 +351,9 @@ fn row(
             let warned = summary
                 .warnings
                 .iter()
-                .find(|w| w.contains("uniform stress"));
+                .find(|w| w.message.contains("uniform stress"));
             match warned {
-                Some(why) if error > LIMIT => TableRow::warned(&name, "error", error, why),
+                Some(why) if error > LIMIT => TableRow::warned(&name, "error", error, &why.message),
                 _ => TableRow::at_most(&name, "error", error, LIMIT),
             }
         }

@@ -119,14 +119,7 @@ fn figure(summary: &RunSummary, name: &str) -> f64 {
 
 /// Adds the growth by the proof, that in the run, and the outcome of the scene at the defaults.
 fn rows(case: &Case, table: &mut Table) {
-    let let_go = [
-        case.overrides,
-        &[
-            "solve.explicit.growing-modes=warn",
-            "solve.explicit.largest-energy-gain=1e9",
-        ],
-    ]
-    .concat();
+    let let_go = [case.overrides, &["solve.explicit.largest-energy-gain=1e9"]].concat();
     let summary = match run(case.text, &let_go, &[]) {
         Ok(summary) => summary,
         Err(reason) => return table.push(TableRow::refused(case.name, "let go", reason)),

@@ -13,8 +13,8 @@ use crate::{
     },
 };
 
-/// The seed of all that is drawn.
-pub(super) const SEED: u64 = 620;
+/// The seeds of all that is drawn: figures of messages were chosen with the first one at hand, and the second one drawn afterwards.
+pub(super) const SEEDS: [u64; 2] = [620, 1201];
 
 /// Scenes of each body, in full and in `Effort::Quick`.
 const EACH: [usize; 2] = [5, 2];
@@ -155,7 +155,7 @@ fn inline(typed: &str) -> String {
 }
 
 /// The scenes; in `Effort::Quick` those of the first bodies.
-pub(super) fn cases(effort: Effort) -> Vec<Case> {
+pub(super) fn cases(effort: Effort, seed: u64) -> Vec<Case> {
     let mut bodies = obstacles::bodies(effort);
     if effort == Effort::Full {
         bodies.extend(more());
@@ -167,7 +167,7 @@ pub(super) fn cases(effort: Effort) -> Vec<Case> {
     };
     let mut cases = Vec::new();
     for (k, body) in bodies.iter().enumerate() {
-        let mut draw = Draw::new(SEED + k as u64);
+        let mut draw = Draw::new(seed + k as u64);
         let Ok(nodes) = obstacles::nodes(body) else {
             continue;
         };

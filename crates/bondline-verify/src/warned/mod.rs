@@ -22,30 +22,71 @@ use bondline::{
     progress::Progress,
 };
 
-/// The table of scenes, and that of their verdicts.
+/// The tables of scenes, and those of their verdicts, by seed.
 pub fn run(effort: Effort, progress: &dyn Progress) -> Vec<Table> {
-    let cases = corpus::cases(effort);
-    progress.stage("warnings", Some(cases.len() as u64));
-    let found: Vec<Result<Outcome, String>> = (cases.par_iter())
-        .map(|case| {
-            let found = outcome(case);
-            progress.advance(1);
-            found
-        })
-        .collect();
-    let tables = vec![scenes(&cases, &found), verdicts(&cases, &found)];
-    for table in &tables {
-        tell(table, effort, progress);
+    let seeds = match effort {
+        Effort::Quick => &corpus::SEEDS[..1],
+        Effort::Full => &corpus::SEEDS[..],
+    };
+    let mut tables = Vec::new();
+    for &seed in seeds {
+        let cases = corpus::cases(effort, seed);
+        progress.stage("warnings", Some(cases.len() as u64));
+        let found: Vec<Result<Outcome, String>> = (cases.par_iter())
+            .map(|case| {
+                let found = outcome(case);
+                progress.advance(1);
+                found
+            })
+            .collect();
+        let of_seed = [
+            scenes(&cases, &found, seed),
+            verdicts(&cases, &found, seed),
+            remedies(&cases, &found, seed),
+        ];
+        for table in of_seed {
+            tell(&table, effort, progress);
+            tables.push(table);
+        }
     }
     tables
 }
 
+/// The remedies of all warnings, tried.
+fn remedies(cases: &[Case], found: &[Result<Outcome, String>], seed: u64) -> Table {
+    let title = format!("Remedies that the warnings of seed {seed} print, tried");
+    let mut table = Table::new(title, Columns::Full);
+    let all = cases.iter().zip(found);
+    let all = all.filter_map(|(case, found)| Some((case, found.as_ref().ok()?)));
+    let tried: Vec<_> = all
+        .flat_map(|(case, outcome)| outcome.tried.iter().map(move |t| (case, t)))
+        .collect();
+    let refused = tried.iter().filter(|(_, t)| t.helps.is_err());
+    let in_vain = tried.iter().filter(|(_, t)| t.helps == Ok(false));
+    table.push(TableRow::info("all", "remedies", tried.len() as f64));
+    for (name, list) in [
+        ("refused when tried", refused.collect::<Vec<_>>()),
+        ("of no help", in_vain.collect()),
+    ] {
+        table.push(TableRow::at_most(name, "remedies", list.len() as f64, 0.0));
+        for (case, tried) in list {
+            let row = TableRow::info(
+                format!("  {}: {}", case.name, tried.name),
+                "among them",
+                1.0,
+            );
+            let why = tried.helps.clone().err().unwrap_or_default();
+            table.push(row.because(&why));
+        }
+    }
+    table
+}
+
 /// Errors and warned figures of each scene.
-fn scenes(cases: &[Case], found: &[Result<Outcome, String>]) -> Table {
+fn scenes(cases: &[Case], found: &[Result<Outcome, String>], seed: u64) -> Table {
     let title = format!(
-        "{} scenes drawn by seed {}: largest errors along lines through the zone, over the largest value there, and what was told of them",
-        cases.len(),
-        corpus::SEED
+        "{} scenes drawn by seed {seed}: largest errors along lines through the zone, over the largest value there, and what was told of them",
+        cases.len()
     );
     let mut table = Table::new(title, Columns::ByQuantity);
     for (case, found) in cases.iter().zip(found) {
@@ -76,8 +117,9 @@ fn scenes(cases: &[Case], found: &[Result<Outcome, String>]) -> Table {
 }
 
 /// Numbers of scenes by verdict.
-fn verdicts(cases: &[Case], found: &[Result<Outcome, String>]) -> Table {
-    let mut table = Table::new("Verdicts on their warnings", Columns::Full);
+fn verdicts(cases: &[Case], found: &[Result<Outcome, String>], seed: u64) -> Table {
+    let title = format!("Verdicts on the warnings of seed {seed}");
+    let mut table = Table::new(title, Columns::Full);
     let mut row = |name: &str, limit: Option<f64>, is_so: &dyn Fn(&Outcome) -> bool| {
         let all = cases.iter().zip(found);
         let named: Vec<&str> = all

@@ -4,6 +4,10 @@ use std::collections::BTreeMap;
 
 use super::corpus::{Case, LINES};
 use crate::meshes::scene;
+use bondline::observe::{
+    summary::RunSummary,
+    warning::{Quantity, Warning},
+};
 
 /// Part of the largest value up to which a displacement is right.
 pub(super) const RIGHT: f64 = 0.01;
@@ -42,31 +46,25 @@ pub(super) struct Told {
 }
 
 impl Told {
-    fn of(warnings: &[String]) -> Self {
+    fn of(warnings: &[Warning]) -> Self {
         let mut told = Self {
             sentences: warnings.len(),
             ..Self::default()
         };
-        for text in warnings {
-            let more = |old: Option<f64>, new: Option<f64>| match (old, new) {
-                (Some(a), Some(b)) => Some(a.max(b)),
-                (a, b) => a.or(b),
-            };
-            let of_stress = [
-                ("a uniform stress comes out wrong by ", "near ("),
-                ("that of outputs may be wrong by ", "at ("),
-                ("to the next: it may be wrong by ", "at ("),
-            ];
-            let of_stress = of_stress.iter().find(|(words, _)| text.contains(words));
-            if let Some((words, before)) = of_stress {
-                let found = percent_after(text, words);
-                if found > told.stress {
-                    (told.stress, told.place) = (found, place_after(text, before));
+        for warning in warnings {
+            let effect = warning.effect.map(f64::abs);
+            match warning.quantity {
+                Some(Quantity::Displacement) if effect > told.displacement => {
+                    told.displacement = effect;
                 }
-            } else if text.contains("differ from those of elements alone by up to") {
-                told.displacement = more(told.displacement, percent_after(text, "by up to "));
-            } else if text.contains("cannot be predicted") || text.contains("is not known") {
-                told.is_unknown = true;
+                Some(Quantity::Stress) if effect.is_none() => told.is_unknown = true,
+                Some(Quantity::Stress) if effect > told.stress => {
+                    told.stress = effect;
+                    told.place = Some(std::array::from_fn(|k| {
+                        warning.place.get(k).copied().unwrap_or(0.0)
+                    }));
+                }
+                _ => {}
             }
         }
         told
@@ -76,23 +74,6 @@ impl Told {
     fn is_any(&self) -> bool {
         self.displacement.is_some() || self.stress.is_some() || self.is_unknown
     }
-}
-
-/// The number before the percent sign that follows some words.
-fn percent_after(text: &str, words: &str) -> Option<f64> {
-    let rest = &text[text.find(words)? + words.len()..];
-    let number = rest.split('%').next()?.trim();
-    number.parse::<f64>().ok().map(|x| 0.01 * x.abs())
-}
-
-/// The place that follows some words.
-fn place_after(text: &str, words: &str) -> Option<[f64; 3]> {
-    let rest = &text[text.find(words)? + words.len()..];
-    let mut place = [0.0; 3];
-    for (x, entry) in place.iter_mut().zip(rest.split(')').next()?.split(',')) {
-        *x = entry.trim().parse().ok()?;
-    }
-    Some(place)
 }
 
 /// End of a run as it is typed.
@@ -127,10 +108,21 @@ impl Run {
     }
 }
 
+/// A remedy of a warning, tried.
+#[derive(Clone, Debug)]
+pub(super) struct Tried {
+    /// Code of the warning, and the values of `--set`.
+    pub name: String,
+    /// True if the error of what is warned of is smaller with it, or right; at the place that is named, where there is one.
+    pub helps: Result<bool, String>,
+}
+
 /// Outcome of a scene.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Outcome {
     pub run: Run,
+    /// The remedies of its warnings.
+    pub tried: Vec<Tried>,
 }
 
 impl Outcome {
@@ -213,54 +205,77 @@ fn error(found: &Along, truth: &Along) -> Error {
     error
 }
 
-/// The key of a line that is a place, and no other lines.
-fn at(place: &[f64]) -> String {
-    let mut end = place.to_vec();
-    end[0] += 1e-9;
-    format!("output.lines={{ a={{ from={place:?}, to={end:?}, samples=2 }} }}")
+impl Case {
+    fn run(&self, overrides: &[&str]) -> Result<(RunSummary, Along), String> {
+        let files = &[("m.msh", self.mesh.as_str())];
+        let (summary, tables) = scene::outputs(&self.text, overrides, files, &LINES)?;
+        Ok((summary, along(tables)?))
+    }
+
+    /// The stress at a place alone.
+    fn stress_at(&self, place: &[f64], overrides: &[&str]) -> Result<f64, String> {
+        let mut end = place.to_vec();
+        end[0] += 1e-9;
+        let line = format!("output.lines={{ a={{ from={place:?}, to={end:?}, samples=2 }} }}");
+        let (_, found) = self.run(&[overrides, &[line.as_str()]].concat())?;
+        let stress = found.values().next().map(|(_, stress)| *stress);
+        stress.ok_or_else(|| "the place lies outside of the body".to_owned())
+    }
+
+    /// Error of the stress at a place, over the stress there.
+    fn error_at(&self, place: &[f64], overrides: &[&str]) -> Result<f64, String> {
+        let truth = self.stress_at(place, &["coupling=local"])?;
+        Ok((self.stress_at(place, overrides)? - truth).abs() / truth)
+    }
+
+    /// Runs the scene with each remedy of a warning; `own` is the error without.
+    fn tried(&self, warning: &Warning, own: Error, truth: &Along) -> Vec<Tried> {
+        let is_of_stress = warning.quantity == Some(Quantity::Stress) && !warning.place.is_empty();
+        let helps = |values: &[&str]| -> Result<bool, String> {
+            // at the place that it names
+            if is_of_stress {
+                let before = self.error_at(&warning.place, &[])?;
+                let after = self.error_at(&warning.place, values)?;
+                return Ok(after < before.max(RIGHT));
+            }
+            let after = error(&self.run(values)?.1, truth);
+            Ok(after.displacement < own.displacement.max(RIGHT))
+        };
+        let each = warning.remedies.iter().map(|remedy| {
+            let values: Vec<&str> = remedy.iter().map(String::as_str).collect();
+            Tried {
+                name: format!("{} by {}", warning.code, remedy.join(", ")),
+                helps: helps(&values),
+            }
+        });
+        each.collect()
+    }
 }
 
 /// Runs a scene as it is typed, and elements alone.
 pub(super) fn outcome(case: &Case) -> Result<Outcome, String> {
-    let files = &[("m.msh", case.mesh.as_str())];
-    let run = |overrides: &[&str]| scene::outputs(&case.text, overrides, files, &LINES);
-    let truth = along(run(&["coupling=local"])?.1)?;
-    let run = match run(&[]) {
-        Ok((summary, tables)) => {
-            let told = Told::of(&summary.warnings);
-            let there = told.place.and_then(|place| {
-                let dimension = summary.dimension;
-                let line = at(&place[..dimension]);
-                let of = |first: &str| {
-                    let keys = [line.as_str(), first];
-                    let found = along(run(&keys[..if first.is_empty() { 1 } else { 2 }]).ok()?.1);
-                    found
-                        .ok()?
-                        .into_iter()
-                        .next()
-                        .map(|(_, (_, stress))| stress)
-                };
-                let (own, truth) = (of("")?, of("coupling=local")?);
-                Some((own - truth).abs() / truth)
-            });
-            Run::Done {
-                error: error(&along(tables)?, &truth),
-                told,
-                there,
-            }
-        }
+    let (_, truth) = case.run(&["coupling=local"])?;
+    let (summary, found) = match case.run(&[]) {
+        Ok(done) => done,
         Err(_) => {
-            let let_go = ["solver.unproven=warn", "solve.explicit.growing-modes=warn"];
-            let keys = if case.text.contains("solve.explicit") {
-                2
-            } else {
-                1
-            };
-            let run = run(&let_go[..keys]).and_then(|found| along(found.1));
-            Run::Refused {
-                error: run.ok().map(|found| error(&found, &truth)),
-            }
+            let run = case.run(&["solver.unproven=warn"]);
+            let error = run.ok().map(|(_, found)| error(&found, &truth));
+            return Ok(Outcome {
+                run: Run::Refused { error },
+                tried: Vec::new(),
+            });
         }
     };
-    Ok(Outcome { run })
+    let (told, own) = (Told::of(&summary.warnings), error(&found, &truth));
+    let place = told.place.map(|place| place[..summary.dimension].to_vec());
+    Ok(Outcome {
+        run: Run::Done {
+            error: own,
+            told,
+            there: place.and_then(|place| case.error_at(&place, &[]).ok()),
+        },
+        tried: (summary.warnings.iter())
+            .flat_map(|warning| case.tried(warning, own, &truth))
+            .collect(),
+    })
 }
