@@ -46,6 +46,8 @@
 //! | `nonlinear.rs`, `nonlinear/` | elements of a law that is not linear: their excess over the linear ones, and their history variables |
 //! | `load.rs` | consistent nodal forces of tractions and body forces |
 //! | `locate.rs` | from a point in space to a cell and its shape functions |
+//! | `conduction.rs` | matrices of heat conduction |
+//! | `nodal_field.rs` | a scalar field by its values at nodes |
 //! | `lumping.rs` | lumped volumes and masses, body forces beside these |
 //! | `body.rs` | the check that elements can live on the cells of a body |
 //!
@@ -53,6 +55,7 @@
 
 mod body;
 mod cell;
+mod conduction;
 mod crack_band;
 mod cut;
 mod divided;
@@ -65,6 +68,7 @@ mod line3;
 mod load;
 mod locate;
 mod lumping;
+mod nodal_field;
 mod nonlinear;
 mod quad4;
 mod quad8;
@@ -81,6 +85,7 @@ mod second_order_tests;
 
 pub use body::{FemError, check};
 pub use cell::{MAX_NODES, PerNode, ReferenceCell, Rule, RulePoint};
+pub use conduction::{add_heat_transfer, conductance, heat_capacity};
 pub use crack_band::{CellBandError, banded_law, crack_band};
 pub use cut::{places_of_part, rule_of_parts};
 pub use divided::may_be_divided;
@@ -95,6 +100,7 @@ pub use load::{
 };
 pub use locate::{Located, Locator, reference_of};
 pub use lumping::{for_each_share, lumped_body_force_vector, nodal_volumes};
+pub use nodal_field::NodalField;
 pub use nonlinear::NonlinearElements;
 pub use superconvergent::{place_in, position_in, superconvergent_gradient};
 

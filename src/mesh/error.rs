@@ -40,7 +40,7 @@ pub enum MeshError {
         source: std::io::Error,
     },
     /// The file name ends in nothing that a reader knows.
-    #[error("{}: no reader for this file extension; use .msh (Gmsh 4.1 or 2.2), .inp (Abaqus, CalculiX), .vtk, .vtu or .vti", path.display())]
+    #[error("{}: no reader for this file extension; use .msh (Gmsh 4.1 or 2.2), .inp (Abaqus, CalculiX), .vtk, .vtu, .vts, .vtr or .vti", path.display())]
     UnknownExtension {
         /// The file.
         path: PathBuf,

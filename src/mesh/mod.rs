@@ -11,10 +11,11 @@
 //! | `gmsh.rs`, `gmsh_kinds.rs` | Gmsh MSH 4.1 and 2.2, ASCII and binary |
 //! | `inp/` | decks of Abaqus and CalculiX: nodes, elements, sets, surfaces, instances |
 //! | `vtk.rs`, `vtk_grid.rs` | VTK files: cells, and groups of them by integers |
-//! | `vtu.rs`, `vtk_legacy.rs` | their two formats, `.vtu` and `.vtk` |
-//! | `vtk_image.rs` | images (`.vti`), whose voxels are cells |
-//! | `vtu_data.rs`, `xml.rs` | data and tags of the former |
+//! | `vtu.rs`, `vtk_legacy.rs`, `vtk_legacy/` | their two formats, XML and `.vtk` |
+//! | `vtk_structured.rs` | grids of rows, columns and layers: images (`.vti`), rectilinear (`.vtr`) and structured ones (`.vts`) |
+//! | `vtu_array.rs`, `vtu_data.rs`, `xml.rs` | arrays, data and tags of the former |
 //! | `quality.rs` | checks that refuse a mesh no element can live on |
+//! | `boxes.rs` | separate boxes around places |
 //! | `facet.rs` | a facet seen from its cell |
 //! | `boundary.rs` | boundary and interface facets, distances to them |
 //! | `bodies.rs` | nodes that cells hold together |
@@ -30,6 +31,7 @@ use std::collections::BTreeMap;
 
 mod bodies;
 pub mod boundary;
+mod boxes;
 mod cell_shape;
 mod conformity;
 mod dilate_erode;
@@ -51,9 +53,10 @@ mod twins;
 pub mod visibility;
 pub mod vtk;
 pub(crate) mod vtk_grid;
-mod vtk_image;
 mod vtk_legacy;
+mod vtk_structured;
 mod vtu;
+mod vtu_array;
 mod vtu_data;
 mod xml;
 

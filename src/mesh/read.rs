@@ -4,9 +4,10 @@ use std::path::Path;
 
 pub use super::mend::Options;
 use super::raw::{Piece, RawMesh, Source, bytes_of};
+pub(crate) use super::vtk_grid::Points;
 use super::{Mesh, MeshError, gmsh, inp, mend, vtk};
 
-/// Reads a mesh of dimension `D`; the file's extension chooses the reader: `.msh`, `.inp`, `.vtk`, `.vtu` or `.vti`.
+/// Reads a mesh of dimension `D`; the file's extension chooses the reader: `.msh`, `.inp`, `.vtk`, `.vtu`, `.vts`, `.vtr` or `.vti`.
 ///
 /// Cells are the elements of dimension `D`. Named groups of them become cell sets, groups of dimension `D − 1` facet sets,
 /// and groups of still lower dimension node sets. The cell set `all` is added unless the file has one of that name. Nodes
@@ -87,6 +88,19 @@ pub fn detect_dimension(path: &Path) -> Result<usize, MeshError> {
     raw.dimension(&source)
 }
 
+/// Reads the coordinates of all points of a VTK file, `.vtk` or `.vtu`, and the numbers that its point array `name` has for them.
+///
+/// # Errors
+/// As [`read`]; [`MeshError::Syntax`] for an array that is missing or has several numbers per point.
+pub(crate) fn points(path: &Path, name: &str) -> Result<Points, MeshError> {
+    let bytes = bytes_of(path)?;
+    let flavour = match extension(path).as_str() {
+        "vtk" => vtk::Flavour::Legacy,
+        _ => vtk::Flavour::Xml,
+    };
+    vtk::points(path, &bytes, flavour, name)
+}
+
 /// The content of a file and of those that it includes.
 struct Loaded {
     bytes: Vec<u8>,
@@ -118,7 +132,7 @@ fn parse<'a>(
         "msh" => gmsh::parse(path, bytes),
         "inp" => inp::parse(path, (bytes, &text.pieces), &options.ignore),
         "vtk" => vtk::parse(path, bytes, vtk::Flavour::Legacy),
-        "vtu" | "vti" => vtk::parse(path, bytes, vtk::Flavour::Xml),
+        "vtu" | "vti" | "vts" | "vtr" => vtk::parse(path, bytes, vtk::Flavour::Xml),
         _ => Err(MeshError::UnknownExtension { path: path.into() }),
     }
 }

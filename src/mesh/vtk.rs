@@ -1,4 +1,4 @@
-//! VTK files: XML unstructured grids and images (`.vtu`, `.vti`, read in `vtu.rs`) and legacy grids (`.vtk`, read in `vtk_legacy.rs`), as meshio and VTK itself write them.
+//! VTK files: XML grids and images (`.vtu`, `.vts`, `.vtr`, `.vti`, read in `vtu.rs`) and legacy grids (`.vtk`, read in `vtk_legacy.rs`), as meshio and VTK itself write them.
 //!
 //! VTK has no named groups. An integer value per cell becomes a set `NAME_VALUE` for each of its values: meshio's
 //! `gmsh:physical` becomes `physical_1`, `physical_2`, … (its value 0 means "no group" and makes no set), and VTK's
@@ -9,8 +9,8 @@
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
-use super::vtk_grid::Grid;
-use super::vtk_image::{PIXEL, VOXEL};
+use super::vtk_grid::{Grid, Points};
+use super::vtk_structured::{PIXEL, VOXEL};
 use super::{CellShape, MeshError, vtk_legacy, vtu};
 use crate::mesh::raw::{OtherShape, RawMesh, RawNode, RawShape, Source};
 
@@ -22,7 +22,7 @@ const MOST_GROUPS: usize = 256;
 pub(super) enum Flavour {
     /// `.vtk`
     Legacy,
-    /// `.vtu` or `.vti`
+    /// `.vtu`, `.vts`, `.vtr` or `.vti`
     Xml,
 }
 
@@ -46,6 +46,19 @@ pub(super) fn parse<'a>(
         first_node = u64::saturating_add(first_node, grid.points);
     }
     Ok((raw, source))
+}
+
+/// The points of a file, each with its number in a point array.
+pub(super) fn points(
+    path: &Path,
+    bytes: &[u8],
+    flavour: Flavour,
+    name: &str,
+) -> Result<Points, MeshError> {
+    match flavour {
+        Flavour::Legacy => vtk_legacy::points(path, bytes, name),
+        Flavour::Xml => vtu::points(path, bytes, name),
+    }
 }
 
 fn add_piece(

@@ -96,6 +96,15 @@ impl Kind {
     }
 }
 
+/// All points of a file with a number for each.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Points {
+    /// Their coordinates.
+    pub coordinates: Vec<[f64; 3]>,
+    /// Their values.
+    pub values: Vec<f64>,
+}
+
 /// The cells of a piece, and the points that they use.
 #[derive(Debug, Default)]
 pub(super) struct Grid {

@@ -1,4 +1,4 @@
-//! VTK legacy files of unstructured grids (`.vtk`), ASCII and binary, of versions 1 to 5.
+//! VTK legacy files of grids (`.vtk`), unstructured or in rows, columns and layers, ASCII and binary, of versions 1 to 5.
 //!
 //! Source: the VTK user's guide, "Simple legacy formats"; `vtkDataWriter` for the names of types that it leaves out (`vtktypeint64`, `vtkIdType`) and for
 //! version 5, whose cells are offsets and connectivity. Binary numbers have the most significant byte first. Everything but points, cells and
@@ -8,28 +8,92 @@ use std::path::Path;
 
 use super::MeshError;
 use crate::mesh::raw::{Encoding, Source};
-use crate::mesh::vtk_grid::{Grid, Kind, Number};
+use crate::mesh::vtk_grid::{Grid, Kind, Number, Points};
+use crate::mesh::vtk_structured::Extent;
+
+mod structured;
 
 /// Remedy for a wrong word in a file.
 const REWRITE: &str = "write the file again, for instance with VTK, ParaView or meshio";
 
 /// Parses a file.
 pub(super) fn parse<'a>(path: &Path, bytes: &'a [u8]) -> Result<(Grid, Source<'a>), MeshError> {
-    let mut reader = Reader {
-        source: Source {
-            path: path.into(),
-            bytes,
-            encoding: Encoding::Text,
-            pieces: &[],
-        },
-        at: 0,
-        section: "the head of the file".into(),
-        points: Vec::new(),
-        grid: Grid::default(),
-        of_cells: None,
-    };
+    let mut reader = Reader::new(path, bytes);
     reader.file()?;
+    reader.take_cells()?;
     Ok((reader.grid, reader.source))
+}
+
+/// The coordinates of all points of a file, and the number that the point array `name` has for each; cells may be missing.
+pub(super) fn points<'a>(path: &Path, bytes: &'a [u8], name: &'a str) -> Result<Points, MeshError> {
+    let mut reader = Reader::new(path, bytes);
+    reader.wanted = Some(name);
+    reader.file()?;
+    let values = reader.values.take().ok_or_else(|| {
+        let wanted = format!("POINT_DATA with the array `{name}` of one number per point");
+        reader.syntax(reader.grid.at, "a grid without it", &wanted)
+    })?;
+    let coordinates = reader.points.chunks_exact(3);
+    if values.len() != coordinates.len() {
+        let found = format!("{} numbers in the array `{name}`", values.len());
+        let wanted = format!("{}, one per point,", coordinates.len());
+        return Err(reader.syntax(reader.grid.at, &found, &wanted));
+    }
+    Ok(Points {
+        coordinates: coordinates.map(|x| [x[0], x[1], x[2]]).collect(),
+        values,
+    })
+}
+
+impl<'a> Reader<'a> {
+    fn new(path: &Path, bytes: &'a [u8]) -> Self {
+        Self {
+            source: Source {
+                path: path.into(),
+                bytes,
+                encoding: Encoding::Text,
+                pieces: &[],
+            },
+            at: 0,
+            section: "the head of the file".into(),
+            points: Vec::new(),
+            grid: Grid::default(),
+            of_cells: None,
+            set: DataSet::Unstructured,
+            extent: None,
+            image: [None; 2],
+            planes: Default::default(),
+            wanted: None,
+            values: None,
+        }
+    }
+}
+
+/// Kinds of data sets that are read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum DataSet {
+    Unstructured,
+    Structured,
+    Rectilinear,
+    Image,
+}
+
+impl DataSet {
+    /// The sections that one has.
+    fn sections(self) -> &'static [&'static str] {
+        match self {
+            Self::Unstructured => &["DATASET", "POINTS", "CELLS", "CELL_TYPES"],
+            Self::Structured => &["DATASET", "DIMENSIONS", "POINTS"],
+            Self::Rectilinear => &[
+                "DATASET",
+                "DIMENSIONS",
+                "X_COORDINATES",
+                "Y_COORDINATES",
+                "Z_COORDINATES",
+            ],
+            Self::Image => &["DATASET", "DIMENSIONS", "ORIGIN", "SPACING"],
+        }
+    }
 }
 
 struct Reader<'a> {
@@ -40,6 +104,17 @@ struct Reader<'a> {
     grid: Grid,
     /// True while data of cells follow, false for those of points; none before any data.
     of_cells: Option<bool>,
+    set: DataSet,
+    /// Of a set in rows, columns and layers.
+    extent: Option<Extent>,
+    /// Origin and spacing of an image.
+    image: [Option<[f64; 3]>; 2],
+    /// Coordinates of the planes of a rectilinear grid.
+    planes: [Vec<f64>; 3],
+    /// The array of points that is read.
+    wanted: Option<&'a str>,
+    /// Its values.
+    values: Option<Vec<f64>>,
 }
 
 impl<'a> Reader<'a> {
@@ -64,26 +139,21 @@ impl<'a> Reader<'a> {
             }
             let keyword = self.word("a keyword")?.to_ascii_uppercase();
             self.section = keyword.clone();
-            let is_once = matches!(
-                keyword.as_str(),
-                "DATASET" | "POINTS" | "CELLS" | "CELL_TYPES"
-            );
+            let is_once = self.set.sections().contains(&keyword.as_str());
             if is_once && seen.contains(&keyword) {
                 return Err(self.syntax(at, &format!("a second {keyword}"), "one grid per file"));
             }
             match keyword.as_str() {
                 "DATASET" => self.data_set(at)?,
+                "DIMENSIONS" => self.dimensions(at)?,
+                "ORIGIN" => self.image[0] = Some(self.triple("the origin")?),
+                "SPACING" => self.image[1] = Some(self.triple("the spacing")?),
+                "X_COORDINATES" => self.planes[0] = self.coordinates(1)?,
+                "Y_COORDINATES" => self.planes[1] = self.coordinates(1)?,
+                "Z_COORDINATES" => self.planes[2] = self.coordinates(1)?,
                 "POINTS" => {
-                    let count = self.count("the number of points")?;
-                    let kind = self.kind()?;
-                    self.grid.points = count;
-                    let mut points = Vec::new();
-                    let all = self.times(count, 3)?;
-                    self.each(kind, all, &mut |n| {
-                        points.push(n.real());
-                        true
-                    })?;
-                    self.points = points;
+                    self.points = self.coordinates(3)?;
+                    self.grid.points = self.points.len() as u64 / 3;
                 }
                 "CELLS" => self.cells()?,
                 "CELL_TYPES" => self.cell_types()?,
@@ -97,11 +167,23 @@ impl<'a> Reader<'a> {
             }
             seen.push(keyword);
         }
-        for wanted in ["DATASET", "POINTS", "CELLS", "CELL_TYPES"] {
+        let needed: &[&str] = match self.wanted {
+            Some(_) => &["DATASET", "POINTS"],
+            None => self.set.sections(),
+        };
+        for &wanted in needed {
             if !seen.iter().any(|s| s == wanted) {
                 self.section = "the file".into();
                 return Err(self.truncated(&format!("a section {wanted}")));
             }
+        }
+        Ok(())
+    }
+
+    /// Takes the cells, and the points that they use.
+    fn take_cells(&mut self) -> Result<(), MeshError> {
+        if let Some(extent) = self.extent {
+            return self.take_structured(&extent);
         }
         if self.grid.ends.len() != self.grid.types.len() {
             let found = format!(
@@ -120,14 +202,24 @@ impl<'a> Reader<'a> {
 
     fn data_set(&mut self, at: usize) -> Result<(), MeshError> {
         let kind = self.word("the kind of data set")?;
-        if kind.eq_ignore_ascii_case("UNSTRUCTURED_GRID") {
+        let known = [
+            ("UNSTRUCTURED_GRID", DataSet::Unstructured),
+            ("STRUCTURED_GRID", DataSet::Structured),
+            ("RECTILINEAR_GRID", DataSet::Rectilinear),
+            ("STRUCTURED_POINTS", DataSet::Image),
+        ];
+        let found = known
+            .iter()
+            .find(|(name, _)| kind.eq_ignore_ascii_case(name));
+        if let Some((_, set)) = found {
+            self.set = *set;
             self.grid.at = at;
             return Ok(());
         }
         Err(MeshError::Unsupported {
             path: self.source.path.clone(),
             place: self.source.place(at),
-            what: format!("a VTK data set other than an unstructured grid ({kind})"),
+            what: format!("a VTK data set other than a grid ({kind})"),
             remedy: "convert it to an unstructured grid",
         })
     }
@@ -253,9 +345,8 @@ impl<'a> Reader<'a> {
             let components = self.count("the number of components")?;
             let tuples = self.count("the number of tuples")?;
             let kind = self.kind()?;
-            let is_of_cells = self.of_cells == Some(true) && components == 1;
             self.array(
-                is_of_cells.then_some(name),
+                (components == 1).then_some(name),
                 kind,
                 self.times(components, tuples)?,
             )?;
@@ -272,7 +363,10 @@ impl<'a> Reader<'a> {
     /// Numbers that belong to points or cells.
     fn attribute(&mut self, at: usize, keyword: &str) -> Result<(), MeshError> {
         let entries = match self.of_cells {
-            Some(true) => self.grid.types.len() as u64,
+            Some(true) => match self.extent.and_then(|extent| extent.count()) {
+                Some(count) => count,
+                None => self.grid.types.len() as u64,
+            },
             Some(false) => self.grid.points,
             None => {
                 return Err(self.syntax(at, keyword, "a section such as POINTS or CELL_DATA"));
@@ -340,18 +434,26 @@ impl<'a> Reader<'a> {
                 self.at = before;
             }
         }
-        let is_of_cells = self.of_cells == Some(true) && components == 1;
         self.array(
-            is_of_cells.then_some(name),
+            (components == 1).then_some(name),
             kind,
             self.times(entries, components)?,
         )
     }
 
-    /// An array, which is kept where it is named and holds integers.
+    /// An array, which is kept where it has one number per cell and holds integers, or is the one of points that is wanted.
     fn array(&mut self, name: Option<String>, kind: Kind, count: u64) -> Result<(), MeshError> {
+        if self.of_cells == Some(false) && name.is_some() && name.as_deref() == self.wanted {
+            let mut values = Vec::new();
+            self.each(kind, count, &mut |n| {
+                values.push(n.real());
+                true
+            })?;
+            self.values = Some(values);
+            return Ok(());
+        }
         let mut values = Vec::new();
-        let name = name.filter(|_| kind.is_integer());
+        let name = name.filter(|_| self.of_cells == Some(true) && kind.is_integer());
         let is_kept = name.is_some();
         self.each(kind, count, &mut |n| {
             if is_kept {

@@ -2,6 +2,9 @@ use std::path::PathBuf;
 
 use super::super::quality::check;
 use super::super::read::{detect_dimension, read};
+use crate::mesh::Mesh;
+use crate::mesh::generate::Axis;
+use crate::tensor::Vector;
 
 fn fixture(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -270,4 +273,137 @@ fn legacy_files_tell_lines_and_pass_over_what_is_no_mesh() {
             "{to}: {message}"
         );
     }
+}
+
+/// Coordinates of the planes of `tests/fixtures/generate_grids.py`.
+const PLANES: [&[f64]; 3] = [&[0.0, 0.5, 2.0, 3.0], &[0.0, 1.0, 1.5], &[0.0, 0.25, 1.0]];
+
+/// Compares a file of VTK's with the mesh of the same planes, each node at `place` of where it lies in them.
+fn is_grid<const D: usize>(name: &str, place: impl Fn(Vector<D>) -> Vector<D>) {
+    let lines = std::array::from_fn(|a| Axis::Coordinates(PLANES[a].to_vec()));
+    let mut wanted: Mesh<D> = crate::mesh::generate::Grid::new(lines).mesh().unwrap();
+    wanted.nodes.iter_mut().for_each(|x| *x = place(*x));
+    let mesh = read::<D>(&fixture(name)).unwrap();
+    assert_eq!(mesh.nodes.len(), wanted.nodes.len(), "{name}");
+    assert_eq!(mesh.cell_count(), wanted.cell_count(), "{name}");
+    for c in 0..mesh.cell_count() {
+        let off = (mesh.centroid(c) - wanted.centroid(c)).norm();
+        let volume = mesh.cell_volume(c) - wanted.cell_volume(c);
+        assert!(off.max(volume.abs()) < 1e-14, "{name}: {c} {off} {volume}");
+    }
+    let half = mesh.cell_count() as u32 / 2;
+    let first: Vec<u32> = (0..half).collect();
+    assert_eq!(mesh.cell_sets["phase_1"], first, "{name}");
+    assert_eq!(mesh.cell_sets["phase_2"].len() as u32, half, "{name}");
+    check(&mesh).unwrap();
+}
+
+#[test]
+fn grids_in_rows_columns_and_layers_are_meshes() {
+    let sheared = |x: Vector<3>| Vector::<3>::new(x[0] + 0.2 * x[1], x[1] + 0.1 * x[2], x[2]);
+    is_grid::<3>("grid_vtk_zlib.vts", sheared);
+    is_grid::<3>("grid_vtk_structured.vtk", sheared);
+    is_grid::<2>("grid_vtk_flat.vts", |x| {
+        Vector::<2>::new(x[0] + 0.2 * x[1], x[1])
+    });
+    is_grid::<3>("grid_vtk_ascii.vtr", |x| x);
+    is_grid::<2>("grid_vtk_flat.vtr", |x| x);
+    is_grid::<2>("grid_vtk_rectilinear.vtk", |x| x);
+    let image = read::<2>(&fixture("grid_vtk_image.vtk")).unwrap();
+    assert_eq!((image.nodes.len(), image.cell_count()), (12, 6));
+    let (low, high) = image.bounds();
+    assert_eq!((low, high), ([1.0, 2.0].into(), [2.5, 2.5].into()));
+    assert_eq!(image.cell_sets["phase_2"], [3, 4, 5]);
+}
+
+#[test]
+fn grids_with_wrong_numbers_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let found = |name: &str, from: &str, to: &str| {
+        let text = std::fs::read_to_string(fixture(name)).unwrap();
+        assert!(text.contains(from), "{from}");
+        let path = folder.path().join(name);
+        std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
+        read::<2>(&path).unwrap_err().to_string()
+    };
+    let (legacy, image) = ("grid_vtk_rectilinear.vtk", "grid_vtk_image.vtk");
+    for (name, from, to, wanted) in [
+        (
+            legacy,
+            "DIMENSIONS 4 3 1",
+            "DIMENSIONS 4 1 3",
+            "line 5: \"DIMENSIONS",
+        ),
+        (
+            legacy,
+            "DIMENSIONS 4 3 1",
+            "DIMENSIONS 4 4000000 4000000",
+            "1e8 cells",
+        ),
+        (
+            legacy,
+            "DIMENSIONS 4 3 1",
+            "DIMENSIONS 4 three 1",
+            "\"three\"",
+        ),
+        (
+            legacy,
+            "DIMENSIONS 4 3 1",
+            "DIMENSIONS 7 2 1",
+            "planes of an extent",
+        ),
+        (legacy, "DIMENSIONS 4 3 1", "", "a section DIMENSIONS"),
+        (image, "SPACING 0.5 0.25 1", "SPACING 0.5 0 1", "above zero"),
+        (
+            image,
+            "phase 1 6 int",
+            "phase 1 6 float",
+            "integers per cell",
+        ),
+        (
+            "grid_vtk_flat.vts",
+            "Piece Extent=\"0 3",
+            "Piece Extent=\"0 6",
+            "numbers in the array",
+        ),
+        (
+            "grid_vtk_flat.vts",
+            "Piece Extent=\"0 3",
+            "Piece Extent=\"0 0",
+            "six planes",
+        ),
+    ] {
+        let message = found(name, from, to);
+        assert!(message.contains(wanted), "{name} {to}: {message}");
+    }
+}
+
+#[test]
+fn points_have_the_numbers_of_their_array() {
+    for name in ["points_vtk.vtu", "points_vtk.vtk"] {
+        let points = super::super::read::points(&fixture(name), "area").unwrap();
+        let place = |k: usize| {
+            [
+                0.25 + 0.5 * (k % 3) as f64,
+                0.25 + 0.5 * (k / 3) as f64,
+                0.0,
+            ]
+        };
+        assert_eq!(
+            points.coordinates,
+            (0..6).map(place).collect::<Vec<_>>(),
+            "{name}"
+        );
+        assert_eq!(points.values, [0.25; 6], "{name}");
+        let error = super::super::read::points(&fixture(name), "volume").unwrap_err();
+        assert!(error.to_string().contains("the array `volume`"), "{error}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("short.vtk");
+    let text = std::fs::read_to_string(fixture("points_vtk.vtk")).unwrap();
+    let short = text.replace("area 1 6 double\n0.25 ", "area 1 5 double\n");
+    assert_ne!(text, short);
+    std::fs::write(&path, short).unwrap();
+    let error = super::super::read::points(&path, "area").unwrap_err();
+    assert!(error.to_string().contains("6, one per point"), "{error}");
 }

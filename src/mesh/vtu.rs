@@ -10,31 +10,15 @@ use std::io::{Error, ErrorKind, Read as _};
 use std::path::Path;
 
 use super::MeshError;
-use super::vtk_image::{Extent, Image};
+use super::vtk_structured::{Extent, Geometry, Image};
+use super::vtu_array::{Array, Content, each_word};
 use super::vtu_data::{Blocks, Data, Storage, kind};
 use super::xml::{Event, Tag, Xml};
 use crate::mesh::raw::{Encoding, Source};
-use crate::mesh::vtk_grid::{Grid, Kind, Number};
+use crate::mesh::vtk_grid::{Grid, Kind, Number, Points};
 
 /// Remedy for a wrong file.
 const REWRITE: &str = "write the file again, for instance with VTK, ParaView or meshio";
-
-/// An array as its tag describes it.
-struct Array<'a> {
-    name: String,
-    kind: Option<Kind>,
-    components: u64,
-    content: Content<'a>,
-    /// Byte where its tag stands.
-    at: usize,
-}
-
-enum Content<'a> {
-    Text(Cow<'a, [u8]>),
-    Base64(Cow<'a, [u8]>),
-    /// This far into the appended data.
-    Appended(u64),
-}
 
 /// A piece of the grid.
 #[derive(Default)]
@@ -47,8 +31,11 @@ struct Piece<'a> {
     offsets: Option<Array<'a>>,
     types: Option<Array<'a>>,
     cell_data: Vec<Array<'a>>,
-    /// Of a piece of an image.
+    point_data: Vec<Array<'a>>,
+    /// Of a piece in rows, columns and layers.
     extent: Option<Extent>,
+    /// Of a rectilinear piece.
+    planes: Vec<Array<'a>>,
 }
 
 struct File<'a> {
@@ -65,55 +52,41 @@ pub(super) fn parse<'a>(
     path: &Path,
     bytes: &'a [u8],
 ) -> Result<(Vec<Grid>, Source<'a>), MeshError> {
-    let mut file = File {
-        source: Source {
-            path: path.into(),
-            bytes,
-            encoding: Encoding::Text,
-            pieces: &[],
-        },
-        storage: Storage {
-            is_big_endian: false,
-            header: 4,
-            is_compressed: false,
-        },
-        image: None,
-        appended: None,
-    };
+    let mut file = File::new(path, bytes);
     let pieces = file.pieces()?;
     let grids: Result<_, MeshError> = pieces.iter().map(|p| file.grid(p)).collect();
     Ok((grids?, file.source))
 }
 
-/// Hands on `count` numbers that are written as words.
-fn each_word(
-    text: &[u8],
-    kind: Kind,
-    count: u64,
-    named: &dyn Fn(String, &str) -> MeshError,
-    take: &mut dyn FnMut(Number) -> Result<(), String>,
-) -> Result<(), MeshError> {
-    let mut found = 0u64;
-    for word in text
-        .split(u8::is_ascii_whitespace)
-        .filter(|w| !w.is_empty())
-    {
-        let number = std::str::from_utf8(word).ok().and_then(|w| kind.parse(w));
-        let Some(number) = number else {
-            let word: String = String::from_utf8_lossy(word).chars().take(40).collect();
-            return Err(named(format!("\"{word}\""), "a number"));
-        };
-        found += 1;
-        if found > count {
-            break;
+/// The coordinates of all points of a file, and the number that the point array `name` has for each; cells may be missing.
+pub(super) fn points(path: &Path, bytes: &[u8], name: &str) -> Result<Points, MeshError> {
+    let mut file = File::new(path, bytes);
+    let pieces = file.pieces()?;
+    let mut points = Points::default();
+    for piece in &pieces {
+        file.add_points(piece, name, &mut points)?;
+    }
+    Ok(points)
+}
+
+impl<'a> File<'a> {
+    fn new(path: &Path, bytes: &'a [u8]) -> Self {
+        Self {
+            source: Source {
+                path: path.into(),
+                bytes,
+                encoding: Encoding::Text,
+                pieces: &[],
+            },
+            storage: Storage {
+                is_big_endian: false,
+                header: 4,
+                is_compressed: false,
+            },
+            image: None,
+            appended: None,
         }
-        take(number).map_err(|e| named(e, "a number that fits the grid"))?;
     }
-    if found == count {
-        return Ok(());
-    }
-    let more = if found > count { "more" } else { "fewer" };
-    Err(named(format!("{more} numbers"), &format!("{count}")))
 }
 
 impl<'a> File<'a> {
@@ -212,15 +185,22 @@ impl<'a> File<'a> {
                 let image = image.ok_or_else(|| self.syntax(at, "another one", wanted))?;
                 self.image = Some(image);
             }
-            ([b"VTKFile", b"ImageData"], b"Piece") => {
+            (
+                [
+                    b"VTKFile",
+                    b"ImageData" | b"RectilinearGrid" | b"StructuredGrid",
+                ],
+                b"Piece",
+            ) => {
                 let text = tag.attribute("Extent").unwrap_or_default();
                 let extent = Extent::parse(&text);
                 let known = extent.and_then(|extent| Some((extent, extent.count()?)));
                 let (extent, cells) = known.ok_or_else(|| {
-                    let wanted = "six planes, first and last along x, y and z";
+                    let wanted = "six planes, first and last along x, y and z (a plane grid is flat along z), and at most 1e8 cells";
                     self.syntax(at, &format!("Extent=\"{text}\""), wanted)
                 })?;
                 pieces.push(Piece {
+                    points: extent.points(),
                     cells,
                     at,
                     extent: Some(extent),
@@ -230,7 +210,7 @@ impl<'a> File<'a> {
             (
                 [
                     b"VTKFile",
-                    b"UnstructuredGrid" | b"ImageData",
+                    b"UnstructuredGrid" | b"ImageData" | b"RectilinearGrid" | b"StructuredGrid",
                     b"Piece",
                     section,
                 ],
@@ -254,7 +234,7 @@ impl<'a> File<'a> {
             remedy,
         };
         match tag.attribute("type").as_deref() {
-            Some("UnstructuredGrid" | "ImageData") => {}
+            Some("UnstructuredGrid" | "ImageData" | "RectilinearGrid" | "StructuredGrid") => {}
             Some("PUnstructuredGrid") => {
                 return Err(unsupported(
                     "a grid spread over several files".into(),
@@ -263,7 +243,7 @@ impl<'a> File<'a> {
             }
             _ => {
                 return Err(unsupported(
-                    "a VTK data set other than an unstructured grid or an image".into(),
+                    "a VTK data set other than a grid or an image".into(),
                     "convert it to an unstructured grid",
                 ));
             }
@@ -346,16 +326,13 @@ impl<'a> File<'a> {
         if piece.cells == 0 {
             return Ok(grid);
         }
-        if let (Some(extent), Some(image)) = (piece.extent, self.image) {
-            grid.points = extent.points();
+        if let Some(extent) = &piece.extent {
             // a size is believed once as many values have been read
             self.add_cell_data(piece, &mut grid)?;
-            if grid.cell_data.is_empty() {
-                let found = "an image without integers per cell";
-                let wanted = "CellData with an integer array, such as the number of a phase (of values per point: the filter PointDataToCellData)";
-                return Err(self.syntax(piece.at, found, wanted));
-            }
-            return Ok(extent.grid(image, grid));
+            let geometry = self.geometry(piece, &grid)?;
+            let wanted = "as many as the extent has";
+            return (extent.grid(&geometry, grid))
+                .map_err(|found| self.syntax(piece.at, &found, wanted));
         }
         let missing = wanted(&piece.coordinates, "Points")
             .or_else(|| wanted(&piece.connectivity, "connectivity"))
@@ -401,6 +378,78 @@ impl<'a> File<'a> {
         })?;
         self.add_cell_data(piece, &mut grid)?;
         Ok(grid)
+    }
+
+    /// The places of the points of a piece in rows, columns and layers, whose values per cell are those of `grid`.
+    fn geometry(&self, piece: &Piece<'_>, grid: &Grid) -> Result<Geometry, MeshError> {
+        let numbers = |array: &Array<'_>, count: u64| {
+            let mut read = Vec::new();
+            self.each(array, count, &mut |n| {
+                read.push(n.real());
+                Ok(())
+            })?;
+            Ok(read)
+        };
+        if let Some(image) = self.image {
+            if grid.cell_data.is_empty() {
+                let found = "an image without integers per cell";
+                let wanted = "CellData with an integer array, such as the number of a phase (of values per point: the filter PointDataToCellData)";
+                return Err(self.syntax(piece.at, found, wanted));
+            }
+            return Ok(Geometry::Image(image));
+        }
+        match (&piece.coordinates, &piece.planes[..], &piece.extent) {
+            (Some(points), ..) => {
+                let read: Vec<f64> = numbers(points, piece.points.saturating_mul(3))?;
+                let read = read.chunks_exact(3).map(|x| [x[0], x[1], x[2]]);
+                Ok(Geometry::Points(read.collect()))
+            }
+            (None, [x, y, z], Some(extent)) => {
+                let [nx, ny, nz] = extent.planes();
+                Ok(Geometry::Planes([
+                    numbers(x, nx)?,
+                    numbers(y, ny)?,
+                    numbers(z, nz)?,
+                ]))
+            }
+            _ => {
+                let wanted = "Points, or Coordinates along x, y and z";
+                Err(self.syntax(piece.at, "a piece without them", wanted))
+            }
+        }
+    }
+
+    /// Adds the points of a piece, each with its number in the array `name`.
+    fn add_points(
+        &self,
+        piece: &Piece<'_>,
+        name: &str,
+        points: &mut Points,
+    ) -> Result<(), MeshError> {
+        if piece.points == 0 {
+            return Ok(());
+        }
+        let lacks = |wanted: &str| self.syntax(piece.at, "a piece without it", wanted);
+        let coordinates =
+            (piece.coordinates.as_ref()).ok_or_else(|| lacks("the array `Points`"))?;
+        let is_its = |a: &&Array<'_>| a.name == name && a.components == 1;
+        let values = piece.point_data.iter().find(is_its).ok_or_else(|| {
+            let wanted = format!("PointData with the array `{name}` of one number per point");
+            lacks(&wanted)
+        })?;
+        // a size is believed once as many values have been read
+        self.each(values, piece.points, &mut |n| {
+            points.values.push(n.real());
+            Ok(())
+        })?;
+        let mut read = Vec::new();
+        self.each(coordinates, piece.points.saturating_mul(3), &mut |n| {
+            read.push(n.real());
+            Ok(())
+        })?;
+        let read = read.chunks_exact(3).map(|x| [x[0], x[1], x[2]]);
+        points.coordinates.extend(read);
+        Ok(())
     }
 
     /// Reads the integers per cell.
@@ -508,6 +557,10 @@ impl<'a> Piece<'a> {
     fn take(&mut self, section: &[u8], array: Array<'a>) {
         if section == b"CellData" {
             self.cell_data.push(array);
+        } else if section == b"PointData" {
+            self.point_data.push(array);
+        } else if section == b"Coordinates" {
+            self.planes.push(array);
         } else if let Some(slot) = self.slot(section, &array.name.clone()) {
             *slot = Some(array);
         }
@@ -518,26 +571,14 @@ impl<'a> Piece<'a> {
         let section = path.len().checked_sub(2).map(|k| path[k])?;
         match section {
             b"CellData" => self.cell_data.last_mut(),
+            b"PointData" => self.point_data.last_mut(),
+            b"Coordinates" => self.planes.last_mut(),
             b"Points" => self.coordinates.as_mut(),
             b"Cells" => [&mut self.connectivity, &mut self.offsets, &mut self.types]
                 .into_iter()
                 .flatten()
                 .max_by_key(|array| array.at),
             _ => None,
-        }
-    }
-}
-
-impl<'a> Array<'a> {
-    /// Adds a part of the text between the tags; keys of information between two parts are left out.
-    fn add(&mut self, text: &'a [u8]) {
-        let (Content::Text(own) | Content::Base64(own)) = &mut self.content else {
-            return;
-        };
-        if own.iter().all(u8::is_ascii_whitespace) {
-            *own = Cow::Borrowed(text);
-        } else if !text.iter().all(u8::is_ascii_whitespace) {
-            own.to_mut().extend_from_slice(text);
         }
     }
 }

@@ -15,20 +15,20 @@ use crate::{
         plane_energy,
         softened_plane::{StateBonds, crack_energy},
     },
-    shape::Barriers,
+    shape::{Barrier, Barriers},
     tensor::{Tensor, Tensor4, Vector},
 };
 
 /// Removes the bonds that barriers or facets cut; `reach` is the largest horizon.
 pub(crate) fn cut<const D: usize>(
-    p: &Peridynamics<D>,
+    barriers: &[Barrier<D>],
     mesh: &Mesh<D>,
     surface: Option<Vec<BoundaryFacet>>,
     reach: f64,
     position: &[Vector<D>],
     families: &mut Families,
 ) {
-    let barriers = Barriers::new(p.barriers.clone());
+    let barriers = Barriers::new(barriers.to_vec());
     let cutter = surface
         .as_ref()
         .map(|facets| SegmentCutter::new(mesh, facets));

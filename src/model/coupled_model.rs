@@ -169,7 +169,14 @@ impl<const D: usize> Model<D> {
         let Some(p) = &self.peridynamics else { return };
         let surface = (p.surfaces == Surfaces::Cut).then(|| self.mesh.outer_facets());
         let longest = p.horizon.of_points(position).largest();
-        bond_cutting::cut(p, &self.mesh, surface, longest, position, families);
+        bond_cutting::cut(
+            &p.barriers,
+            &self.mesh,
+            surface,
+            longest,
+            position,
+            families,
+        );
     }
 
     /// The peridynamic body, if there is one.

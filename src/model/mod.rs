@@ -21,6 +21,7 @@
 //! | `shared_families.rs`, `shared_body.rs`, `held_families.rs` | families that are spread over processes | |
 //! | `clearance.rs` | sizes of sites, and how far the body extends beyond them | |
 //! | `crack_layers.rs` | area of cracks from the band of broken bonds | |
+//! | `cut_shares.rs` | shares of families that voids and cracks have cut away | |
 //! | `bins.rs`, `zone_distance.rs` | positions in bins; distances to zones | |
 //!
 //! No file here knows a method of coupling; [`ZoneLayout`] is all that a method demands.
@@ -32,6 +33,7 @@ pub(crate) mod completed_lattice;
 pub(crate) mod continued_lattice;
 pub(crate) mod coupled_model;
 pub(crate) mod crack_layers;
+mod cut_shares;
 mod distribution;
 pub(crate) mod family_ends;
 pub mod field_evaluation;

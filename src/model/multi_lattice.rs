@@ -162,7 +162,7 @@ impl<const D: usize> Model<D> {
         let surface = self.cutting_surface(p, lattice);
         let longest = reaches.iter().copied().fold(0.0, f64::max);
         bond_cutting::cut(
-            p,
+            &p.barriers,
             &self.mesh,
             surface,
             longest,

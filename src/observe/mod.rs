@@ -12,6 +12,7 @@
 //! | `report.rs` | rows with a verdict, their table for people and their JSON |
 //! | `summary.rs`, `motion_summary.rs` | summary of one run: sizes, choices, timings, balance; energies over time |
 //! | `cracks.rs` | energy and area of broken bonds, in a summary |
+//! | `tip_summary.rs` | energy release rate and stress intensity factors at the tip of a crack, in a summary |
 //! | `provenance.rs` | program, scene, machine and times of a run, in a file beside its outputs |
 //! | `proof.rs` | results of the checks of a model before it is solved |
 //! | `warning.rs` | doubts about a model or its solution |
@@ -34,6 +35,7 @@ pub mod report;
 pub mod rezoning_event;
 pub mod series;
 pub mod summary;
+pub mod tip_summary;
 pub mod vtu;
 pub mod warning;
 

@@ -10,6 +10,7 @@ pub use super::motion_summary::{Ended, EnergyGain, ImpactorSummary, MotionSummar
 use super::proof::Proof;
 pub use super::report::grouped;
 use super::report::{aligned, components, number};
+use super::tip_summary::TipSummary;
 use super::warning::Warning;
 
 /// Seconds of one stage.
@@ -221,6 +222,9 @@ pub struct RunSummary {
     /// Forces in the sections that the scene asks for, at the end of the run.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sections: Vec<SectionForce>,
+    /// Energy release rates and stress intensity factors at the tips of cracks, as far as the scene asks for them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tips: Vec<TipSummary>,
     /// Stored energy `½ uᵀ K u`; a coupled model with an unsymmetric tangent has none in the strict sense.
     pub energy: Option<f64>,
     /// Results of the checks of the model before it was solved.
@@ -351,6 +355,9 @@ impl fmt::Display for RunSummary {
                 true => writeln!(f)?,
                 false => writeln!(f, ", moment {}", components(&s.moment))?,
             }
+        }
+        for tip in &self.tips {
+            writeln!(f, "{tip}")?;
         }
         write!(f, "{}", self.proof)?;
         for warning in &self.warnings {

@@ -14,6 +14,7 @@ use crate::peridynamics::BondWeights;
 use crate::run::error::RunError;
 use crate::scene::Peridynamics;
 use crate::scene::solve::Solve;
+use crate::scene::temperature::TemperatureValue;
 use crate::scene::validated::Scene;
 use serde::Serialize;
 
@@ -102,6 +103,8 @@ pub struct Counts {
     pub dofs: f64,
     /// Scalars of the assembled stiffness.
     pub nonzeros: f64,
+    /// Bytes of heat conduction: a temperature per node and instant, matrices and gradients.
+    heat: f64,
     /// True if the rows of points couple to the families of their neighbours as well.
     is_state_based: bool,
     /// True if the run takes steps, each of which traverses the bonds.
@@ -118,6 +121,7 @@ impl Counts {
             nodes: mesh.nodes.len(),
             cells: mesh.cell_count(),
             is_moving: scene.solve != Solve::Static,
+            heat: heat(scene),
             ..Self::default()
         };
         let of_elements = |nodes: f64| nodes * 3f64.powi(D as i32) * (D * D) as f64;
@@ -233,6 +237,9 @@ impl Counts {
                 PER_SEARCHED * self.searched + (PER_BOND + state * PER_STATE_BOND) * self.bonds,
             ),
         ];
+        if self.heat > 0.0 {
+            list.push(share("temperatures", self.heat));
+        }
         if self.is_moving {
             let per_bond = if self.is_lattice {
                 PER_LATTICE_PASS
@@ -260,6 +267,19 @@ impl Counts {
     }
 }
 
+/// Bytes of heat conduction, if the scene has it.
+fn heat<const D: usize>(scene: &Scene<D>) -> f64 {
+    let value = scene.temperature.as_ref().map(|t| &t.value);
+    let Some(TemperatureValue::Conduction(conduction)) = value else {
+        return 0.0;
+    };
+    let instants = conduction.times.len() as f64;
+    let row = 3f64.powi(D as i32) * PER_HEAT_ENTRY;
+    conduction.mesh.nodes.len() as f64 * (8.0 * instants + row + PER_NODE)
+}
+
+/// Bytes of a pair of nodes in heat conduction: columns and numbers of conductance, capacity, their sum and the gradient.
+const PER_HEAT_ENTRY: f64 = 64.0;
 /// Bytes of a cell of the mesh: shape, nodes, zone, role, material, what finds it by its place.
 const PER_CELL: f64 = 100.0;
 /// Bytes of a node: position, cells around, site, its row of weights.

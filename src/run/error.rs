@@ -77,6 +77,17 @@ pub enum RunError {
         /// The couplings in the order in which they were tried, and why each does not hold.
         tried: Vec<(String, RunError)>,
     },
+    /// The steady temperature of a part of the body is known but for a constant.
+    #[error(
+        "heat conduction: nothing prescribes the temperature of {nodes} nodes around ({}); give that part of the body a temperature or a convection condition, or type temperature.conduction.initial for a transient temperature",
+        place.iter().map(|x| format!("{x:.4e}")).collect::<Vec<_>>().join(", ")
+    )]
+    LooseTemperature {
+        /// Number of nodes.
+        nodes: usize,
+        /// Position of one of them.
+        place: Vec<f64>,
+    },
     /// The zone cannot have a rim of its own.
     #[error("{0}")]
     Rim(String),
@@ -93,6 +104,12 @@ pub enum RunError {
         message: String,
         /// Place, one coordinate per dimension; empty where no single place is to blame.
         place: Vec<f64>,
+    },
+    /// A ring around the tip of a crack leaves the body.
+    #[error("`output.tips.{tip}`: the rings around the tip leave the body; type smaller `radii`")]
+    TipOutside {
+        /// The tip, as the scene names it.
+        tip: String,
     },
     /// Something that is planned and not there yet.
     #[error("{what}: {remedy}")]
@@ -193,6 +210,7 @@ impl RunError {
         };
         match self {
             Self::Denied(warning) => at(&warning.place),
+            Self::LooseTemperature { place, .. } => at(place),
             Self::Unproven { place, .. } => at(place),
             Self::Law { place, source, .. } => match place {
                 Some(place) => at(place),

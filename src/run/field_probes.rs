@@ -8,9 +8,16 @@ use crate::model::{Carrier, Model, Sampler};
 use crate::scene::validated::Output;
 use crate::tensor::Vector;
 
-/// Carriers of the probes, and slopes there; none in a scene that asks for no field.
+/// The probes that something carries; none in a scene that asks for no field.
 pub(super) struct FieldProbes {
-    carriers: Vec<Option<(Carrier, Option<Slope>)>>,
+    carriers: Vec<Option<CarriedProbe>>,
+}
+
+/// Position of a probe, its carrier, and the slope there.
+struct CarriedProbe {
+    x: Vec<f64>,
+    carrier: Carrier,
+    slope: Option<Slope>,
 }
 
 /// The columns of a scene's probes.
@@ -37,7 +44,11 @@ impl FieldProbes {
         let slopes = Slopes::new(model);
         let carriers = output.probes.iter().map(|(_, x)| {
             let carrier = sampler.carrier(x)?;
-            Some((carrier, slopes.at(x, carrier)))
+            Some(CarriedProbe {
+                x: x.as_slice().to_vec(),
+                carrier,
+                slope: slopes.at(x, carrier),
+            })
         });
         Self {
             carriers: carriers.collect(),
@@ -52,14 +63,14 @@ impl FieldProbes {
     /// The fields at each probe; zero where nothing carries it.
     pub fn row<const D: usize>(&self, solved: &Solved<'_, D>) -> Vec<f64> {
         let (rows, shared) = (Rows::new(solved, false), Shared::of(solved));
-        let of_probe = |probe: &Option<(Carrier, Option<Slope>)>| {
-            let Some((carrier, slope)) = probe else {
+        let of_probe = |probe: &Option<CarriedProbe>| {
+            let Some(CarriedProbe { x, carrier, slope }) = probe else {
                 return rows.at(None);
             };
             let slope = slope.as_ref().filter(|_| solved.has_slope(*carrier));
             let slope = slope.map(|slope| slope.of_whole(solved.model, &shared.intact));
-            let place =
-                Place::of_position(solved, &shared, (*carrier, None), slope.as_deref(), None);
+            let here = (&Vector::from_column_slice(x), *carrier, None);
+            let place = Place::of_position(solved, &shared, here, slope.as_deref(), None);
             rows.at(Some(&place))
         };
         self.carriers.iter().flat_map(of_probe).collect()

@@ -22,8 +22,10 @@
 //! | `field_probes.rs` | fields at probes with each row of a history |
 //! | `stresses.rs`, `stress_settings.rs` | stress as outputs show it |
 //! | `slopes.rs` | strain and stress between the places that carry them |
+//! | `conduction.rs` | the temperature that heat conduction gives |
 //! | `thermal.rs` | the force on each site that a change of temperature gives |
 //! | `condition_terms.rs` | forces of conditions that depend on the displacement, on the sites of a model |
+//! | `energy_release.rs` | energy release rate and stress intensity factors at the tips of cracks |
 //! | `sections.rs` | force and moment that the part of the body beyond a plane exerts on the rest |
 //! | `balance.rs`, `rotation.rs`, `surface_gradient.rs`, `warnings.rs` | balance of loads and reactions; rotation of elements; stresses that families do not resolve; properties of a model that make its results doubtful |
 //! | `linear_parts.rs` | elements, rows and bonds that are linear, or stay whole, beyond where their material is |
@@ -39,7 +41,9 @@ pub(crate) mod block;
 pub mod budget;
 pub mod chosen;
 pub(crate) mod condition_terms;
+mod conduction;
 mod definiteness;
+mod energy_release;
 pub mod equilibrium;
 pub(crate) mod error;
 mod field_probes;

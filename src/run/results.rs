@@ -146,7 +146,7 @@ impl Table {
         let number = |entry: &Entry| match entry {
             Entry::Real(x) => *x,
             Entry::Integer(n) => *n as f64,
-            // no table of a run holds words
+            // no table of a run holds words, but for empty ones of what is not known
             Entry::Text(_) => f64::NAN,
         };
         Ok(self.rows.iter().map(|row| number(&row[k])).collect())

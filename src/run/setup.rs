@@ -171,7 +171,7 @@ impl<const D: usize> RunSettings<D> {
     }
 }
 
-/// The problem of a scene, and what remains of the scene.
+/// The problem of a scene, and what remains of the scene; of a temperature that is solved for it knows the reference alone, which is enough for sizes and estimates.
 pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) {
     let stresses = StressSettings::of(&scene);
     let material = scene.point_materials[0];

@@ -126,32 +126,58 @@ impl<'a, const D: usize> SampledSolution<'a, D> {
             .collect()
     }
 
-    /// The rows of a table along positions, with the columns of [`table_header`]; none for a position outside of the body. Collective where families are spread.
-    pub fn rows(&self, positions: &[Vector<D>]) -> Vec<Vec<f64>> {
+    /// Samples at positions, none outside of the body, and the gradients of the points that they need. Collective where families are spread.
+    fn sampled(
+        &self,
+        positions: &[Vector<D>],
+    ) -> (Vec<Option<Sample<D>>>, FxHashMap<usize, Tensor<D>>) {
         let samples: Vec<Option<Sample<D>>> = parallel::map_slice(positions, |x| self.at(x));
         let of_points = self.gradients_of_points(&samples);
+        (samples, of_points)
+    }
+
+    /// The place of a sample at `x`, from the gradients of the points.
+    fn place<'s>(
+        &'s self,
+        x: &Vector<D>,
+        sample: &'s Sample<D>,
+        of_points: &FxHashMap<usize, Tensor<D>>,
+    ) -> Place<'s, D> {
         let of = |teller: Teller| match teller {
             Teller::Element(c) => self.solved.element_gradient(c),
             Teller::Point(site) => of_points[&site],
         };
+        let slope = sample.slope.as_ref();
+        let gradients = match (slope, sample.carrier) {
+            (Some(slope), Carrier::Point(site)) => Some([slope.value(of), of(Teller::Point(site))]),
+            (Some(slope), Carrier::Element(..)) => Some([slope.value(of); 2]),
+            (None, Carrier::Point(site)) => Some([of(Teller::Point(site)); 2]),
+            (None, Carrier::Element(..)) => None,
+        };
+        let here = (x, sample.carrier, Some(sample.displacement));
+        Place::of_position(self.solved, &self.shared, here, slope, gradients)
+    }
+
+    /// The rows of a table along positions, with the columns of [`table_header`]; none for a position outside of the body. Collective where families are spread.
+    pub fn rows(&self, positions: &[Vector<D>]) -> Vec<Vec<f64>> {
+        let (samples, of_points) = self.sampled(positions);
         let fields = Rows::new(self.solved, true);
         // a line may cross a slit: there is nothing to tell in it
         let places = positions.iter().zip(&samples);
         let told: Vec<_> = places.filter_map(|(x, s)| Some((x, s.as_ref()?))).collect();
         parallel::map_slice(&told, |(x, sample)| {
-            let slope = sample.slope.as_ref();
-            let gradients = match (slope, sample.carrier) {
-                (Some(slope), Carrier::Point(site)) => {
-                    Some([slope.value(of), of(Teller::Point(site))])
-                }
-                (Some(slope), Carrier::Element(..)) => Some([slope.value(of); 2]),
-                (None, Carrier::Point(site)) => Some([of(Teller::Point(site)); 2]),
-                (None, Carrier::Element(..)) => None,
-            };
-            let here = (sample.carrier, Some(sample.displacement));
-            let place = Place::of_position(self.solved, &self.shared, here, slope, gradients);
-            let numbers = fields.at(Some(&place));
+            let numbers = fields.at(Some(&self.place(x, sample, &of_points)));
             x.iter().copied().chain(numbers).collect()
+        })
+    }
+
+    /// The displacement gradient and the stress \[Pa\] at each position; none outside of the body. Collective where families are spread.
+    pub fn stressed(&self, positions: &[Vector<D>]) -> Vec<Option<(Tensor<D>, Tensor<D>)>> {
+        let (samples, of_points) = self.sampled(positions);
+        let places: Vec<_> = positions.iter().zip(&samples).collect();
+        parallel::map_slice(&places, |(x, sample)| {
+            let place = self.place(x, sample.as_ref()?, &of_points);
+            Some((place.gradient(), place.stress().tensor))
         })
     }
 }

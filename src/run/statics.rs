@@ -1,12 +1,13 @@
 //! From a static scene to its solution.
 
 use super::chosen::with_choice;
+use super::conduction::heated_problem;
 use super::equilibrium::{Assembled, Equilibrium, StaticInput, equilibrium};
 use super::motion::{self, RunOptions};
 use super::proof::{self, Subject};
 use super::rotation::Rotations;
 use super::sections::Sections;
-use super::setup::{RunSettings, model_choices, problem, same_everywhere, shared_model, sizes};
+use super::setup::{RunSettings, model_choices, same_everywhere, shared_model, sizes};
 use super::solution::{Moved, Solved, zone_of_site};
 use super::static_contact::with_contact;
 use super::zone_placement::{CachedSolution, difference_from_elements};
@@ -26,6 +27,7 @@ use crate::observe::warning::Warning;
 use crate::progress::Progress;
 use crate::run::balance::{Balance, furthest, round_off};
 use crate::run::definiteness;
+use crate::run::energy_release;
 use crate::run::error::RunError;
 use crate::run::linear_parts::{LinearParts, Passed, RunKind};
 use crate::run::surface_gradient::{Asked, steep_stresses};
@@ -120,7 +122,7 @@ fn solve_chosen<const D: usize>(
     if let Some(placement) = &scene.placement {
         timings.add("placing the zone", placement.seconds);
     }
-    let (problem, rest) = problem(scene);
+    let (problem, rest) = heated_problem(scene, (&mut timings, &mut watch), progress)?;
     same_everywhere(&rest, 0, ranks)?;
     let fresh;
     let (model, coupling) = match &kept {
@@ -180,10 +182,12 @@ fn solve_chosen<const D: usize>(
         stresses: (&rest.stresses, 0.0),
     };
     let told = body.summary(equilibrium, traits, proof)?;
+    let tips = energy_release::at_rest(&solved, &rest.output, ranks)?;
     let files = visit(&rest.output, &solved)?;
     watch.lap(&mut timings, "output");
     progress.finish();
     let mut summary = RunSummary {
+        tips,
         scene: name,
         sizes: body.sizes(counts, equilibrium.solution.info.matrix_nnz),
         choices,

@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
-use super::thermal::Thermal;
+use super::thermal::{TemperatureField, Thermal};
 use crate::material::{Kinematics, LocalLaw};
 use crate::peridynamics::bond_force::BondKinematics;
+use crate::scene::expression::Expression;
 use crate::scene::materials::{Material, Ratio};
+use crate::scene::temperature::TemperatureValue;
 use crate::scene::validated::{FieldChoice, Scene};
 
 /// Thermal part of a scene's stresses, and the quantities that are made of stresses.
@@ -13,6 +15,8 @@ use crate::scene::validated::{FieldChoice, Scene};
 pub struct StressSettings<const D: usize> {
     /// The fields that are asked for.
     pub output: FieldChoice,
+    /// True if the stresses around the tip of a crack are integrated.
+    pub at_tips: bool,
     /// Thermal expansion, if any material expands.
     pub thermal: Option<Thermal<D>>,
     /// Reduction of the solid: plane stress, plane strain or another.
@@ -26,7 +30,7 @@ pub struct StressSettings<const D: usize> {
 }
 
 impl<const D: usize> StressSettings<D> {
-    /// Of a scene.
+    /// Of a scene; one whose temperature is solved for stays at its reference until [`heated_problem`](super::conduction::heated_problem) has the solution.
     pub fn of(scene: &Scene<D>) -> Self {
         let kinematics = scene.kinematics;
         let ratio = |m: &Material<D>| Ratio::new(m.lame, kinematics).typed;
@@ -40,7 +44,11 @@ impl<const D: usize> StressSettings<D> {
         let (low, high) = scene.mesh.bounds();
         let size = (high - low).norm() / (cells as f64).powf(1.0 / D as f64);
         let thermal = scene.temperature.as_ref().map(|temperature| Thermal {
-            temperature: temperature.clone(),
+            temperature: TemperatureField::Typed(match &temperature.value {
+                TemperatureValue::Typed(value) => value.clone(),
+                TemperatureValue::Conduction(_) => Expression::constant(temperature.reference),
+            }),
+            reference: temperature.reference,
             expansion: (scene.materials.iter())
                 .map(|m| alpha(m) / of_solid(m))
                 .collect(),
@@ -49,6 +57,7 @@ impl<const D: usize> StressSettings<D> {
         });
         Self {
             output: scene.output.fields.clone(),
+            at_tips: (scene.output.tips.iter()).any(|tip| tip.domains.is_some()),
             thermal,
             kinematics,
             bonds: scene.breaking.bonds,
@@ -61,8 +70,8 @@ impl<const D: usize> StressSettings<D> {
         }
     }
 
-    /// Returns true if stresses of points need more than the bonds that a process has of its own: numbers are made of them, or a temperature has a part in them.
+    /// Returns true if stresses of points need more than the bonds that a process has of its own: numbers are made of them, they are integrated, or a temperature has a part in them.
     pub fn asks_for_more(&self) -> bool {
-        self.thermal.is_some() || self.output.has_numbers()
+        self.thermal.is_some() || self.at_tips || self.output.has_numbers()
     }
 }

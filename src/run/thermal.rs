@@ -16,18 +16,47 @@ use crate::coupling::semidiscrete::FreeStretch;
 use crate::fem;
 use crate::parallel;
 use crate::run::error::RunError;
-use crate::scene::temperature::Temperature;
+use crate::scene::expression::Expression;
 use crate::tensor::{Tensor, Vector, padded};
 use crate::{
     coupling::Operator,
     model::{CellRole, Model, SiteKind},
 };
 
+/// Temperature of a place at a time.
+#[derive(Clone, Debug)]
+pub enum TemperatureField<const D: usize> {
+    /// An expression.
+    Typed(Expression),
+    /// A solution of heat conduction.
+    Solved(Arc<fem::NodalField<D>>),
+}
+
+impl<const D: usize> TemperatureField<D> {
+    /// The temperature at `x` and the time `t`.
+    pub fn at(&self, x: &Vector<D>, t: f64) -> f64 {
+        match self {
+            Self::Typed(value) => value.eval_at(&padded(x), t),
+            Self::Solved(field) => field.value(x, t),
+        }
+    }
+
+    /// Returns true if it changes in time.
+    pub fn varies_in_time(&self) -> bool {
+        match self {
+            Self::Typed(value) => value.depends_on_time(),
+            Self::Solved(field) => field.varies_in_time(),
+        }
+    }
+}
+
 /// The temperature of a body, and how its materials expand.
 #[derive(Clone, Debug)]
 pub struct Thermal<const D: usize> {
-    /// The temperature, and the one without stress.
-    pub temperature: Temperature,
+    /// The temperature.
+    pub temperature: TemperatureField<D>,
+    /// The temperature without thermal strain.
+    pub reference: f64,
     /// Expansion per degree of each material within the dimensions of the scene: `(1 + ν) α` in plane strain.
     pub expansion: Vec<f64>,
     /// Expansion of the solid over that: 1, and 1/(1 + ν) in plane strain.
@@ -62,16 +91,24 @@ struct Rise<const D: usize> {
 impl<const D: usize> Thermal<D> {
     /// Temperature less that without stress.
     pub fn rise_at(&self, x: &Vector<D>, t: f64) -> f64 {
-        self.temperature.value.eval_at(&padded(x), t) - self.temperature.reference
+        self.temperature.at(x, t) - self.reference
     }
 
     fn rise(&self, x: &Vector<D>, t: f64) -> Rise<D> {
+        let typed = match &self.temperature {
+            TemperatureField::Typed(value) => value,
+            TemperatureField::Solved(field) => {
+                let (value, slope) = field.value_and_gradient(x, t);
+                let value = value - self.reference;
+                return Rise { value, slope };
+            }
+        };
         let slope = |k: usize| {
             let mut step = Vector::zeros();
             step[k] = self.reach;
             (self.rise_at(&(x + step), t) - self.rise_at(&(x - step), t)) / (2.0 * self.reach)
         };
-        let varies = self.temperature.value.depends_on_position();
+        let varies = typed.depends_on_position();
         Rise {
             value: self.rise_at(x, t),
             slope: Vector::from_fn(|k, _| if varies { slope(k) } else { 0.0 }),
@@ -87,7 +124,7 @@ impl<const D: usize> Thermal<D> {
     pub fn free_stretch(&self) -> FreeStretch<D> {
         let (of_points, of_cells) = (self.clone(), self.clone());
         FreeStretch {
-            varies_in_time: self.temperature.value.depends_on_time(),
+            varies_in_time: self.temperature.varies_in_time(),
             at: Arc::new(move |x, material, t| of_points.stretch_at(x, material, t)),
             of_cell: Arc::new(move |model, c, t| of_cells.expanded_nodes(model, c, t)),
             solid: self.solid.clone(),

@@ -73,6 +73,10 @@ pub(crate) fn selected<const D: usize>(
         let why = "the scene has no [peridynamics]".to_owned();
         return Ok(of(CouplingSpec::Local(LocalSpec {}), span, Some(why)));
     };
+    if matches!(p.points, Some(PointsSpec::File(_))) {
+        let why = "the points of a file are the whole body".to_owned();
+        return Ok(of(CouplingSpec::Nonlocal(NonlocalSpec {}), span, Some(why)));
+    }
     let truncated = of(
         CouplingSpec::Truncated(TruncatedSpec::default()),
         span.clone(),
@@ -159,7 +163,7 @@ fn obstacle<const D: usize>(
             ));
         }
     }
-    if matches!(p.points, Some(PointsSpec::Cells)) {
+    if matches!(p.points, Some(PointsSpec::Cells | PointsSpec::File(_))) {
         return certain("points that are no lattice");
     }
     if p.weights == BondWeights::Fitted {

@@ -23,7 +23,9 @@ pub(crate) fn horizon_of<const D: usize>(
     let cells: Vec<usize> = cells.collect();
     let (spacing, of_what) = match &spec.points {
         Some(PointsSpec::Lattice(lattice)) => (lattice.spacing.value, "spacings of the points"),
-        Some(PointsSpec::Cells) => (mean_size(mesh, &cells), "mean sizes of the cells"),
+        Some(PointsSpec::Cells | PointsSpec::File(_)) => {
+            (mean_size(mesh, &cells), "mean sizes of the cells")
+        }
         // as fine as the cells where they are a grid
         None => match of_cells(mesh, &cells, f64::INFINITY) {
             Some((edge, _)) => (edge, "edges of the zone's cells"),

@@ -27,8 +27,8 @@ use super::user_material;
 use super::validated::{Scene, Solver};
 use super::zones::Placed;
 use super::{
-    adaptive_zone, agreement, coupling_selection, cracks_and_voids, elements, failure, initial,
-    lattice_regions, material_interfaces, output, solve, zones,
+    adaptive_zone, agreement, coupling_selection, crack_tips, cracks_and_voids, elements, failure,
+    initial, lattice_regions, material_interfaces, output, point_file, solve, zones,
 };
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
@@ -49,7 +49,7 @@ pub(crate) struct Draft<'a, const D: usize> {
     pub cell_material: Vec<u16>,
     pub solve: Solve,
     pub conditions: Vec<Condition<D>>,
-    pub temperature: Option<Temperature>,
+    pub temperature: Option<Temperature<D>>,
     pub initial: Vec<Initial<D>>,
     pub impactors: Vec<Impactor<D>>,
     pub solver: Solver,
@@ -76,7 +76,11 @@ impl<'a, const D: usize> Draft<'a, D> {
         table_rows::read_files(&spec.tables, directory, &mut fingerprint)?;
         let may_touch = spec.contact.is_some();
         let label = spec.kinematics.span();
-        let mesh = meshing::build::<D>(&spec.mesh, directory, &label, may_touch)?;
+        let mesh = match (point_file::of(spec), &spec.mesh) {
+            (Some(file), _) => point_file::body::<D>(spec, file, directory)?,
+            (None, Some(mesh)) => meshing::build::<D>(mesh, directory, &label, may_touch)?,
+            (None, None) => return Err(meshing::missing()),
+        };
         let influence = match spec
             .peridynamics
             .as_ref()
@@ -102,7 +106,8 @@ impl<'a, const D: usize> Draft<'a, D> {
         let conditions = condition_list::conditions(&spec.conditions, &mesh, clock)?;
         let initial = initial::initial(&spec.initial, &mesh, clock)?;
         let impactors = impactors::impactors(spec, &solve)?;
-        let temperature = temperature::temperature(spec.temperature.as_ref(), &mesh, clock)?;
+        let stuff = (materials.as_slice(), cell_material.as_slice());
+        let temperature = temperature::temperature(spec, &mesh, stuff, clock)?;
         meshing::add_mesh(&mesh, &mut fingerprint);
         Ok(Self {
             spec,
@@ -139,7 +144,9 @@ impl<'a, const D: usize> Draft<'a, D> {
             materials: self.materials.clone(),
             cell_material,
             conditions: condition_list::conditions(&spec.conditions, &mesh, clock)?,
-            temperature: temperature::temperature(spec.temperature.as_ref(), &mesh, clock)?,
+            temperature: (self.temperature.as_ref())
+                .map(|t| t.on_mesh(&mesh, clock))
+                .transpose()?,
             initial: initial::initial(&spec.initial, &mesh, clock)?,
             impactors: self.impactors.clone(),
             solve: self.solve.clone(),
@@ -344,7 +351,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             warnings: spec.warnings.policy(),
             fingerprint: self.fingerprint.clone(),
         };
-        Ok((scene, selected.otherwise))
+        Ok((crack_tips::laid_out(spec, scene)?, selected.otherwise))
     }
 }
 

@@ -80,7 +80,9 @@ fn refuse_needless<const D: usize>(
                 &format!("`no-fail.{name}` names a region"),
             ));
         }
-        if let Some(name) = spec.output.tips.keys().next() {
+        // the tip of a typed crack may stand
+        let mut tips = spec.output.tips.iter();
+        if let Some((name, _)) = tips.find(|(_, tip)| tip.energy_release != Some(true)) {
             return Err(needless(
                 name.span.clone(),
                 &format!("`output.tips.{name}` follows a crack"),

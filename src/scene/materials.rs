@@ -56,6 +56,10 @@ pub struct Material<const D: usize> {
     pub fracture: Option<Fracture>,
     /// Linear thermal expansion per degree; none if not given.
     pub expansion: Option<f64>,
+    /// Thermal conductivity [W/(m K)]; none if not given.
+    pub conductivity: Option<f64>,
+    /// Heat capacity per volume [J/(m³ K)]; none if not given.
+    pub heat_capacity: Option<f64>,
 }
 
 impl<const D: usize> Material<D> {
@@ -103,6 +107,7 @@ pub(crate) fn materials<const D: usize>(
             (lame, density),
             directory,
         )?;
+        let [conductivity, heat_capacity] = conduction(name, material)?;
         found.push(Material {
             name: name.value.clone(),
             law,
@@ -110,21 +115,15 @@ pub(crate) fn materials<const D: usize>(
             density,
             fracture: fracture(name, material)?,
             expansion: material.thermal_expansion().map(|alpha| alpha.value),
+            conductivity,
+            heat_capacity,
         });
         match (cells, rest) {
             (Some(cells), _) => {
                 for c in cells_of(name, cells, mesh)? {
                     if let Some(other) = owner[c].replace(number) {
                         let other = &found[other as usize].name;
-                        let span = match &cells.0 {
-                            ShapeSpec::Set(set) => set.span.clone(),
-                            _ => name.span.clone(),
-                        };
-                        return Err(SceneError::conflict(format!(
-                            "cell {c} belongs to the materials `{other}` and `{name}`"
-                        ))
-                        .label(span, "this set overlaps another")
-                        .help("make the sets of cells disjoint"));
+                        return Err(claimed_twice(c, other, (name, cells)));
                     }
                 }
             }
@@ -155,6 +154,30 @@ pub(crate) fn materials<const D: usize>(
         }
     }
     Ok((found, material))
+}
+
+/// The error of a cell that two materials fill.
+fn claimed_twice(cell: usize, other: &str, (name, cells): (&Text, &CellsSpec)) -> SceneError {
+    let span = match &cells.0 {
+        ShapeSpec::Set(set) => set.span.clone(),
+        _ => name.span.clone(),
+    };
+    SceneError::conflict(format!(
+        "cell {cell} belongs to the materials `{other}` and `{name}`"
+    ))
+    .label(span, "this set overlaps another")
+    .help("make the sets of cells disjoint")
+}
+
+/// Conductivity and heat capacity, where they are typed.
+fn conduction(name: &Text, spec: &MaterialSpec) -> Result<[Option<f64>; 2], SceneError> {
+    let [k, c] = spec.conduction();
+    let of = |key: &str, number: Option<&Number>| {
+        let place = format!("materials.{name}.{}.{key}", spec.law());
+        let checked = number.map(|n| bounds_checks::positive(&place, n));
+        checked.transpose()
+    };
+    Ok([of("conductivity", k)?, of("heat-capacity", c)?])
 }
 
 /// The cells of a material that names some.

@@ -124,6 +124,13 @@ fn raised<const D: usize>(mut mesh: Mesh<D>) -> Mesh<D> {
     mesh
 }
 
+/// The error of a scene without a body.
+pub(crate) fn missing() -> SceneError {
+    SceneError::missing("the scene lacks `mesh`")
+        .label(0..0, "not found in this scene")
+        .help("add [mesh.line], [mesh.rectangle], [mesh.box] or [mesh.file]; or peridynamics.points.file, whose points are the body")
+}
+
 /// The mesh of a scene whose file lies in `directory`.
 pub(crate) fn build<const D: usize>(
     spec: &MeshSpec,
@@ -200,7 +207,7 @@ pub(crate) fn build<const D: usize>(
 const SMALLEST: f64 = 1e-40;
 const LARGEST: f64 = 1e40;
 
-fn can_be_computed_with<const D: usize>(mesh: &Mesh<D>) -> Result<(), SceneError> {
+pub(super) fn can_be_computed_with<const D: usize>(mesh: &Mesh<D>) -> Result<(), SceneError> {
     let (lo, hi) = mesh.bounds();
     let extent = (hi - lo).amax();
     let farthest = lo.amax().max(hi.amax());

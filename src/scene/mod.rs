@@ -9,13 +9,13 @@
 //! | `spec/` | what is typed; the JSON Schema comes from here |
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `draft.rs`, `validated.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
-//! | `meshing.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `materials.rs`, `material_interfaces.rs`, `peridynamics.rs`, `default_points.rs`, `default_horizon.rs`, `cracks_and_voids.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs`, `section.rs` | its parts |
+//! | `meshing.rs`, `point_file.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `materials.rs`, `material_interfaces.rs`, `peridynamics.rs`, `default_points.rs`, `default_horizon.rs`, `cracks_and_voids.rs`, `crack_tips.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs`, `section.rs` | its parts |
 //! | `coupling_selection.rs`, `selected_coupling.rs` | the coupling that is typed, or the one that suits the scene |
 //! | `coupling_kinds/` | the couplings that are typed, one file each |
 //! | `condition_kinds/` | the conditions that are typed, one file each: loads, supports, springs |
 //! | `conditions.rs`, `load.rs`, `condition_at.rs`, `condition_list.rs` | a condition; a load, where it acts and its density; where a condition is read; all conditions together |
 //! | `components.rs`, `places.rs` | vector fields, and the sets and shapes that conditions name |
-//! | `temperature.rs` | the temperature of the body |
+//! | `temperature.rs`, `conduction.rs` | the temperature of the body; the heat conduction whose solution it is |
 //! | `impactors.rs` | rigid bodies that strike or press |
 //! | `user_material.rs` | materials of a user's routine |
 //! | `bounds_checks.rs` | numbers within their bounds |
@@ -35,8 +35,10 @@ mod condition_at;
 pub mod condition_kinds;
 mod condition_list;
 pub(crate) mod conditions;
+pub(crate) mod conduction;
 pub mod coupling_kinds;
 pub(crate) mod coupling_selection;
+mod crack_tips;
 pub(crate) mod cracks_and_voids;
 mod default_horizon;
 pub mod default_points;
@@ -57,6 +59,7 @@ pub(crate) mod output;
 pub(crate) mod parse;
 pub(crate) mod peridynamics;
 pub(crate) mod places;
+mod point_file;
 pub(crate) mod region;
 pub(crate) mod rim;
 pub(crate) mod section;

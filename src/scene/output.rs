@@ -254,5 +254,7 @@ fn tip<const D: usize>(key: &Text, spec: &TipSpec, mesh: &Mesh<D>) -> Result<Tip
             None => Region::everywhere(),
         },
         threshold,
+        // laid out once the rest of the scene is known
+        domains: None,
     })
 }

@@ -28,7 +28,7 @@ impl SceneSpec {
         })
         .map_err(|error| translate(&error, &places).shown_in(source))?;
         table_rows::take_in(&mut spec.tables, &tables).map_err(|error| error.shown_in(source))?;
-        if let MeshSpec::File(file) = &mut spec.mesh {
+        if let Some(MeshSpec::File(file)) = &mut spec.mesh {
             file.held = source.mesh().cloned();
         }
         Ok(spec)
@@ -150,7 +150,6 @@ fn missing(key: &str, at: &str) -> (String, String) {
         ("", "kinematics") => {
             "add kinematics = \"bar\", \"plane-stress\", \"plane-strain\" or \"solid\""
         }
-        ("", "mesh") => "add [mesh.line], [mesh.rectangle], [mesh.box] or [mesh.file]",
         ("", "materials") => {
             "add a material, for example [materials.steel.lps] with youngs-modulus and poisson-ratio"
         }

@@ -80,7 +80,8 @@ pub(crate) fn peridynamics<const D: usize>(
             points_why = Some(why);
             points
         }
-        Some(PointsSpec::Cells) => PointSource::Cells,
+        // each point of a file has a cell of its own
+        Some(PointsSpec::Cells | PointsSpec::File(_)) => PointSource::Cells,
         Some(PointsSpec::Lattice(lattice)) => {
             let spacing =
                 bounds_checks::positive("peridynamics.points.lattice.spacing", &lattice.spacing)?;
@@ -119,7 +120,14 @@ pub(crate) fn peridynamics<const D: usize>(
         points_why,
         weights: spec.weights,
         volumes: volumes(spec)?,
-        surfaces: spec.surfaces,
+        // the cells of points from a file share no faces
+        surfaces: match spec.points {
+            Some(PointsSpec::File(_)) => Surfaces::Uncut,
+            _ => spec
+                .surfaces
+                .as_ref()
+                .map_or_else(Surfaces::default, |s| *s.get_ref()),
+        },
     })
 }
 
@@ -148,9 +156,9 @@ fn volumes(spec: &PeridynamicsSpec) -> Result<PartialVolume, SceneError> {
             .label(typed.span(), "needs a lattice of points")
             .help(help))
     };
-    if matches!(spec.points, Some(PointsSpec::Cells)) {
+    if matches!(spec.points, Some(PointsSpec::Cells | PointsSpec::File(_))) {
         return conflict(
-            "`peridynamics.volumes` is partial, and the points are those of the mesh's cells",
+            "`peridynamics.volumes` is partial, and the points are those of the mesh's cells or of a file",
             "give peridynamics.points.lattice a spacing, or use volumes = \"full\"",
         );
     }

@@ -95,6 +95,11 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
+    /// Time at the end; zero where nothing moves.
+    pub fn end(&self) -> f64 {
+        self.instants.last().copied().unwrap_or(0.0)
+    }
+
     /// Instants at which a condition is tested: the first if it does not change.
     pub fn instants(&self, moving: bool) -> &[f64] {
         if moving { &self.instants } else { &[0.0] }

@@ -237,12 +237,16 @@ impl Source {
     /// [`SceneErrorKind::Syntax`](crate::scene::SceneErrorKind::Syntax), [`SceneErrorKind::Choice`](crate::scene::SceneErrorKind::Choice) where the scene is none.
     pub fn text(&self, folder: &std::path::Path) -> Result<String, SceneError> {
         let mut table = self.table()?;
-        let path = table
-            .get_mut("mesh")
-            .and_then(|m| m.get_mut("file"))
-            .and_then(|f| f.get_mut("path"));
-        if let Some(toml::Value::String(path)) = path {
-            *path = folder.join(&*path).display().to_string();
+        for keys in [&["mesh", "file"][..], &["peridynamics", "points", "file"]] {
+            let (first, rest) = (table.get_mut(keys[0]), &keys[1..]);
+            let file = rest
+                .iter()
+                .try_fold(first, |at, key| Some(at?.get_mut(key)))
+                .flatten();
+            let path = file.and_then(|f| f.get_mut("path"));
+            if let Some(toml::Value::String(path)) = path {
+                *path = folder.join(&*path).display().to_string();
+            }
         }
         let materials = table.get_mut("materials").and_then(|m| m.as_table_mut());
         for (_, material) in materials.into_iter().flatten() {

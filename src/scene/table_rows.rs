@@ -146,21 +146,23 @@ pub(crate) fn read_files(
     Ok(())
 }
 
+/// The lines of a table by their numbers, from 1, and their words, between commas, semicolons or blanks; empty lines and those that begin with # are left out.
+pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
+    text.lines().enumerate().filter_map(|(number, line)| {
+        let line = line.trim().trim_start_matches('\u{feff}');
+        let words = match line.contains([',', ';']) {
+            true => line.split([',', ';']).map(str::trim).collect(),
+            false => line.split_whitespace().collect(),
+        };
+        (!line.is_empty() && !line.starts_with('#')).then_some((number + 1, words))
+    })
+}
+
 /// The rows of a file, or the line at fault and what is wrong with it.
 fn rows_of(text: &str) -> Result<Vec<(f64, f64)>, (usize, String)> {
     let mut rows: Vec<(f64, f64)> = Vec::new();
     let mut is_first = true;
-    for (number, line) in text.lines().enumerate() {
-        let number = number + 1;
-        let line = line.trim().trim_start_matches('\u{feff}');
-        if line.is_empty() || line.starts_with('#') {
-            continue;
-        }
-        let separated = |c: char| matches!(c, ',' | ';') || c.is_whitespace();
-        let words: Vec<&str> = match line.contains([',', ';']) {
-            true => line.split([',', ';']).map(str::trim).collect(),
-            false => line.split(separated).filter(|w| !w.is_empty()).collect(),
-        };
+    for (number, words) in lines(text) {
         let was_first = std::mem::replace(&mut is_first, false);
         if was_first && words.iter().all(|w| w.parse::<f64>().is_err()) {
             continue;

@@ -11,8 +11,8 @@ use toml::de::{DeTable, DeValue};
 use super::condition_kinds::ConditionSpec;
 use super::error::{SceneError, SceneErrorKind, closest, quoted};
 use super::spec::{
-    AxisSpec, CouplingSpec, InitialSpec, MeshSpec, MicromodulusSpec, PointsSpec, ShapeSpec,
-    SolveSpec, TransitionSpec,
+    AxisSpec, CouplingSpec, HeatConditionSpec, InitialSpec, MeshSpec, MicromodulusSpec, PointsSpec,
+    ShapeSpec, SolveSpec, TransitionSpec,
 };
 use crate::peridynamics::laws::Named;
 
@@ -88,10 +88,12 @@ pub(crate) fn options(path: &[&str]) -> Option<Vec<&'static str>> {
         ["materials", _, _, "micromodulus"] => keys::<MicromodulusSpec>(),
         ["peridynamics", "points"] => keys::<PointsSpec>(),
         ["conditions", _] => ConditionSpec::KEYS.to_vec(),
+        ["temperature", "conduction", "conditions", _] => keys::<HeatConditionSpec>(),
         ["zones", "transition"] => keys::<TransitionSpec>(),
         ["zones", "nonlocal"]
         | ["conditions" | "initial", _, _, "inside"]
         | ["zones", "bodies", _, "inside"]
+        | ["temperature", "conduction", "conditions", _, _, "inside"]
         | ["voids", _, "inside"]
         | ["materials", _, _, "cells"]
         | ["output", "tips", _, "inside"]

@@ -57,7 +57,7 @@ pub struct Scene<const D: usize> {
     /// Displacements, tractions, body forces.
     pub conditions: Vec<Condition<D>>,
     /// The temperature, if the scene has one.
-    pub temperature: Option<super::temperature::Temperature>,
+    pub temperature: Option<super::temperature::Temperature<D>>,
     /// Empty regions: no point lies inside.
     pub voids: Vec<Shape<D>>,
     /// Voids and cracks that cut bonds.
@@ -173,6 +173,21 @@ pub struct Tip<const D: usize> {
     pub inside: Region<D>,
     /// Damage from which a point counts.
     pub threshold: f64,
+    /// Domains of the integrals at the tip, if the scene asks for them.
+    pub domains: Option<TipDomains<D>>,
+}
+
+/// Rings around the tip of a crack, over which its energy release rate is integrated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TipDomains<const D: usize> {
+    /// The end of the typed crack \[m\]: the tip, as long as the crack does not grow.
+    pub tip: Vector<D>,
+    /// The direction in which the typed crack would grow straight on, of length 1.
+    pub along: Vector<D>,
+    /// Radii between which the rings lie, from the smallest to the largest \[m\].
+    pub radii: Vec<f64>,
+    /// Lamé's parameters (λ_D, μ) of the body there \[Pa\].
+    pub lame: (f64, f64),
 }
 
 impl<const D: usize> Scene<D> {

@@ -6,11 +6,14 @@ use bondline::run::AnyScene;
 use bondline::scene::Source;
 
 mod along_lines;
+mod conduction;
+mod crack_tips;
 mod fields;
 mod heated_bonds;
 mod heated_flow;
 mod heated_laws;
 mod mirrored;
+mod point_file;
 mod pressure;
 mod rotation;
 mod second_order;

@@ -213,12 +213,12 @@ fn refined(
     let horizon = typed_horizon(pd)?;
     overrides.push(format!("peridynamics.horizon={:e}", horizon * delta));
     let (shape, axes) = match &spec.mesh {
-        MeshSpec::Line(m) => ("line", vec![("x", m.x.get_ref())]),
-        MeshSpec::Rectangle(m) => (
+        Some(MeshSpec::Line(m)) => ("line", vec![("x", m.x.get_ref())]),
+        Some(MeshSpec::Rectangle(m)) => (
             "rectangle",
             vec![("x", m.x.get_ref()), ("y", m.y.get_ref())],
         ),
-        MeshSpec::Box(m) => (
+        Some(MeshSpec::Box(m)) => (
             "box",
             vec![
                 ("x", m.x.get_ref()),
@@ -226,13 +226,19 @@ fn refined(
                 ("z", m.z.get_ref()),
             ],
         ),
-        MeshSpec::File(file) => {
+        Some(MeshSpec::File(file)) => {
             if matches!(pd.points, Some(PointsSpec::Cells)) {
                 return Err(SceneError::conflict("points in the cells of a mesh from a file get no finer: the horizon would shrink over the same points")
                     .label(file.path.span.clone(), "stays as it is")
                     .help("use a lattice, --set peridynamics.points.lattice.spacing=..., or a mesh that is generated"));
             }
             ("", Vec::new())
+        }
+        None => {
+            return Err(SceneError::conflict(
+                "points from a file get no finer: the horizon would shrink over the same points",
+            )
+            .help("use a mesh and a lattice of points"));
         }
     };
     // a whole number of cells cannot shrink by any factor: points follow the mesh, or they would leave its nodes
@@ -255,7 +261,7 @@ fn refined(
     }
     let spacing = match &pd.points {
         Some(PointsSpec::Lattice(lattice)) => Some(lattice.spacing.value),
-        Some(PointsSpec::Cells) => None,
+        Some(PointsSpec::Cells | PointsSpec::File(_)) => None,
         None => chosen,
     };
     if let Some(spacing) = spacing {

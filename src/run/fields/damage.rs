@@ -15,7 +15,7 @@ impl<const D: usize> OutputField<D> for Damage {
             rank: Rank::Scalar,
             wanted: WrittenWhen::Always,
             columns: TableColumns::Never,
-            text: "Share of the volume of a family whose bonds are broken, or have lost their stiffness; 0 at nodes.",
+            text: "Share of the volume of a family whose bonds are broken, have lost their stiffness, or are cut by a crack or a void of the scene; 0 at nodes.",
         }
     }
 

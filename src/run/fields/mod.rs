@@ -8,6 +8,7 @@
 //! | `damage.rs` | share of the bonds that are broken |
 //! | `model.rs`, `material.rs`, `volume.rs` | model, material and volume of a cell |
 //! | `strain.rs`, `stress.rs`, `stress_numbers.rs` | strain, stress and the numbers made of it |
+//! | `temperature.rs` | temperature |
 //! | `energy_density.rs`, `strain_energy_density.rs` | stored energy of points; of elements and points |
 //! | `stored_energy.rs` | the energies of both |
 //! | `place.rs` | where fields are asked for |
@@ -31,6 +32,7 @@ mod strain;
 mod strain_energy_density;
 mod stress;
 mod stress_numbers;
+mod temperature;
 mod velocity;
 mod volume;
 
@@ -62,6 +64,7 @@ fn all<const D: usize>() -> Vec<&'static dyn OutputField<D>> {
         &stress_numbers::MAX_PRINCIPAL,
         &stress_numbers::MIN_PRINCIPAL,
         &strain_energy_density::StrainEnergyDensity,
+        &temperature::Temperature,
         &material::Material,
     ]
 }

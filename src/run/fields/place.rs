@@ -56,6 +56,7 @@ pub(in crate::run) struct Place<'a, const D: usize> {
     pub solved: &'a Solved<'a, D>,
     pub shared: &'a Shared,
     pub spot: Spot,
+    position: Option<Vector<D>>,
     displacement: Option<Vector<D>>,
     /// Those that tell strain and stress between them, where not one alone does.
     slope: Option<&'a Slope>,
@@ -72,6 +73,7 @@ impl<'a, const D: usize> Place<'a, D> {
             solved,
             shared,
             spot,
+            position: None,
             displacement: None,
             slope: None,
             gradient: OnceCell::new(),
@@ -84,18 +86,30 @@ impl<'a, const D: usize> Place<'a, D> {
     pub fn of_position(
         solved: &'a Solved<'a, D>,
         shared: &'a Shared,
-        (carrier, displacement): (Carrier, Option<Vector<D>>),
+        (x, carrier, displacement): (&Vector<D>, Carrier, Option<Vector<D>>),
         slope: Option<&'a Slope>,
         gradients: Option<[Tensor<D>; 2]>,
     ) -> Self {
         let known = |k: usize| gradients.map_or_else(OnceCell::new, |g| OnceCell::from(g[k]));
         Self {
+            position: Some(*x),
             displacement,
             slope,
             gradient: known(0),
             of_carrier: known(1),
             ..Self::new(solved, shared, carrier.into())
         }
+    }
+
+    /// Position \[m\]; of a whole element, or of its part, its centroid.
+    pub fn position(&self) -> Vector<D> {
+        let model = self.solved.model;
+        self.position.unwrap_or_else(|| match self.spot {
+            Spot::Node { node, .. } => model.mesh.nodes[node],
+            Spot::Point(site) => model.sites[site].position,
+            Spot::InElement(c, xi) => fem::place_in(&model.mesh, c, &xi),
+            Spot::Element(c) | Spot::Part(c, _) => model.mesh.centroid(c),
+        })
     }
 
     /// Site, of a point and of a node that is one.

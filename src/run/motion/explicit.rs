@@ -56,7 +56,7 @@ pub(crate) fn run<const D: usize>(
     options: &RunOptions<'_>,
     progress: &dyn Progress,
 ) -> Result<RunSummary, RunError> {
-    let (mut begun, mut problem, rest) = begun(scene);
+    let (mut begun, mut problem, rest) = begun(scene, progress)?;
     let (file, saved) = opened(&rest, options, &mut begun.choices)?;
     if let Some(saved) = &saved {
         let cells = problem.body.mesh.cell_count();

@@ -10,6 +10,7 @@
 //! | `explicit.rs` | the run in time |
 //! | `initial_state.rs` | initial state of its steps: at the start, at a checkpoint, after a change of the zone |
 //! | `step_observer.rs` | observation of each step, and output |
+//! | `field_output.rs` | fields of a moment, as output files and probes show them |
 //! | `quasi_static.rs`, `inside_step.rs`, `doubtful_equilibria.rs` | the run under a load that grows; progress within a step; doubts about its equilibria |
 //! | `newton_factors.rs`, `spread_factors.rs` | the factors or multigrid that precondition it, of one process or of several |
 //! | `time_step.rs` | the time step, with sub-cycling |
@@ -37,6 +38,7 @@ mod doubtful_equilibria;
 pub(crate) mod driven_impactors;
 pub mod dynamic_system;
 pub mod explicit;
+mod field_output;
 pub(crate) mod guard;
 pub(crate) mod impact;
 pub(crate) mod impact_record;

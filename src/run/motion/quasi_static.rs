@@ -12,6 +12,7 @@ use super::created_energy::{created_energy, set_free};
 use super::doubtful_equilibria::DoubtfulEquilibria;
 use super::dynamic_system::{failing_stretch, start};
 use super::explicit::end_of_steps;
+use super::field_output::FieldOutput;
 use super::guard::energies_are_apart;
 use super::impact::{BodyOnly, impacted};
 use super::impact_record::ImpactRecord;
@@ -21,7 +22,6 @@ use super::parted::has_parted;
 use super::saved::{EdgeReached, Saved, StepChoice};
 use super::setup::{ModelSetup, RunSetup, laid_out, opened, recorder, restore};
 use super::spread_factors::Leads;
-use super::step_observer::FieldOutput;
 use super::time_dependent_loads::SceneDrive;
 use super::writer::{Moment, Recorder};
 use crate::model::Model;
@@ -465,6 +465,11 @@ impl<const D: usize> LoadStepObserver<'_, D> {
         let energies = recorder.energies(&moment);
         let place = |site: usize| self.model.sites[site].position;
         let probed = self.fields.probed(&moment);
+        if recorder.integrates_at_tips() {
+            let (broken, damage) = (moment.broken_bonds(), recorder.damage(&moment));
+            let solved = self.fields.solved(&moment, &broken, damage.as_deref());
+            recorder.find_tips(&moment, &solved);
+        }
         recorder.row(&moment, energies, &probed, place)?;
         if shown {
             self.fields.write(recorder, &moment)?;
@@ -532,6 +537,7 @@ impl<const D: usize> LoadStepObserver<'_, D> {
             applied,
             reactions: self.recorder.reactions(),
             sections: self.recorder.section_forces(),
+            tips: self.recorder.tips.iter().flatten().cloned().collect(),
             iterations: self.iterations,
             motion: Some(motion),
             files: self.recorder.files(),

@@ -17,6 +17,7 @@ use crate::observe::proof::Proof;
 use crate::observe::summary::{Decision, Stopwatch, Timings, resident_memory_bytes};
 use crate::progress::Progress;
 use crate::run::condition_terms::ConditionTerms;
+use crate::run::conduction::heated_problem;
 use crate::run::error::RunError;
 use crate::run::proof::{self, Subject, growth};
 use crate::run::setup::{self, RunSettings};
@@ -76,9 +77,15 @@ impl RunSetup {
     }
 }
 
-/// Takes a scene apart.
-pub(crate) fn begun<const D: usize>(scene: Scene<D>) -> (RunSetup, Problem<D>, RunSettings<D>) {
-    let watch = Stopwatch::start();
+/// Takes a scene apart, once its temperature is solved for.
+///
+/// # Errors
+/// Those of heat conduction.
+pub(crate) fn begun<const D: usize>(
+    scene: Scene<D>,
+    progress: &dyn Progress,
+) -> Result<(RunSetup, Problem<D>, RunSettings<D>), RunError> {
+    let mut watch = Stopwatch::start();
     let title = scene.title.clone();
     let traits = scene.coupling.traits();
     let remedy = growth::remedy(&scene.coupling);
@@ -86,7 +93,7 @@ pub(crate) fn begun<const D: usize>(scene: Scene<D>) -> (RunSetup, Problem<D>, R
     if let Some(placement) = &scene.placement {
         timings.add("placing the zone", placement.seconds);
     }
-    let (problem, rest) = setup::problem(scene);
+    let (problem, rest) = heated_problem(scene, (&mut timings, &mut watch), progress)?;
     let begun = RunSetup {
         title,
         traits,
@@ -95,7 +102,7 @@ pub(crate) fn begun<const D: usize>(scene: Scene<D>) -> (RunSetup, Problem<D>, R
         timings,
         watch,
     };
-    (begun, problem, rest)
+    Ok((begun, problem, rest))
 }
 
 /// Lays a problem out and hands it on, and gives it back afterwards.
@@ -176,7 +183,7 @@ pub fn laid_out<const D: usize, S, T>(
     first: impl FnOnce(&RunSettings<D>, &mut Vec<Decision>) -> Result<S, RunError>,
     then: impl FnOnce(ModelSetup<'_, D>, S) -> Result<T, RunError>,
 ) -> Result<T, RunError> {
-    let (mut begun, problem, rest) = begun(scene);
+    let (mut begun, problem, rest) = begun(scene, progress)?;
     let ready = first(&rest, &mut begun.choices)?;
     let start = LayoutStart {
         broken: None,

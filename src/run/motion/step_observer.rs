@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use super::RunOptions;
 use super::breaks::{Breaks, damage_at_edge};
 use super::dynamic_system::{failing_stretch, failure_criterion};
+use super::field_output::FieldOutput;
 use super::guard::{Balance, Guard};
 use super::saved::{EdgeReached, SavedZone, StepChoice};
 use super::seen::Seen;
@@ -17,13 +18,9 @@ use crate::observe::summary::{Ended, Timings};
 use crate::observe::warning::Warning;
 use crate::progress::Progress;
 use crate::run::error::RunError;
-use crate::run::field_probes::FieldProbes;
 use crate::run::linear_parts::{LinearParts, RunKind};
-use crate::run::pieces::Piece;
 use crate::run::rotation::Rotations;
 use crate::run::setup::RunSettings;
-use crate::run::solution::{self, Moved, Solved};
-use crate::run::stress_settings::StressSettings;
 use crate::run::surface_gradient::{Asked, steep_stresses};
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::EdgeSpec;
@@ -64,87 +61,6 @@ pub(super) struct Segment<'a, 'r, const D: usize> {
     /// The stress error of a uniform field at surfaces of points.
     pub uniform: f64,
     pub breaks: Breaks,
-}
-
-/// Fields of a model as output files show them.
-pub(super) struct FieldOutput<'a, const D: usize> {
-    model: &'a Model<D>,
-    operator: &'a Operator<'a, D>,
-    zone_of_site: Vec<crate::model::Zone>,
-    stresses: &'a StressSettings<D>,
-    probes: FieldProbes,
-    /// Piece of them that this one of several processes shows.
-    piece: Option<Piece>,
-}
-
-impl<'a, const D: usize> FieldOutput<'a, D> {
-    /// Of a model and the rows of its sites.
-    pub fn new(
-        model: &'a Model<D>,
-        operator: &'a Operator<'a, D>,
-        rest: &'a RunSettings<D>,
-        options: &RunOptions<'_>,
-    ) -> Self {
-        let (output, stresses) = (&rest.output, &rest.stresses);
-        let writers = options.writers().filter(|_| output.vtu);
-        Self {
-            probes: FieldProbes::new(model, output),
-            model,
-            operator,
-            zone_of_site: solution::zone_of_site(model),
-            stresses,
-            piece: writers.map(|ranks| Piece::new(model, output.points, ranks)),
-        }
-    }
-
-    /// Writes the fields of a moment.
-    ///
-    /// # Errors
-    /// [`ObserveError`] if they cannot be written.
-    pub fn write(
-        &self,
-        recorder: &mut Recorder<'_, D>,
-        moment: &Moment<'_>,
-    ) -> Result<(), ObserveError> {
-        let broken = moment.broken_bonds();
-        let damage = recorder.damage(moment);
-        let solved = self.solved(moment, &broken, damage.as_deref());
-        recorder.output(moment, &solved, self.piece.as_ref())
-    }
-
-    /// A moment as it is shown.
-    fn solved<'m>(
-        &'m self,
-        moment: &'m Moment<'_>,
-        broken: &'m [(u32, u32)],
-        damage: Option<&'m [f64]>,
-    ) -> Solved<'m, D> {
-        Solved {
-            model: self.model,
-            operator: self.operator,
-            displacement: &moment.state.u,
-            residual: &[],
-            zone_of_site: &self.zone_of_site,
-            system: Some(moment.system),
-            moved: Moved {
-                velocity: Some(&moment.state.v),
-                damage,
-                broken,
-            },
-            sections: &[],
-            stresses: (self.stresses, moment.state.time),
-        }
-    }
-
-    /// Stresses at the probes, as far as they are asked for.
-    pub fn probed(&self, moment: &Moment<'_>) -> Vec<f64> {
-        match self.probes.is_empty() {
-            true => Vec::new(),
-            false => self
-                .probes
-                .row(&self.solved(moment, &moment.broken_bonds(), None)),
-        }
-    }
 }
 
 /// Observations before the first step of a segment.

@@ -4,9 +4,10 @@ use super::RunOptions;
 use super::tips::farthest;
 use crate::observe::ObserveError;
 use crate::observe::csv::{CsvTable, Entry};
+use crate::observe::tip_summary::TipSummary;
 use crate::run::solution::Solved;
 use crate::run::solution_samples::{SampledSolution, table_header};
-use crate::scene::validated::Output;
+use crate::scene::validated::{Output, Tip};
 use crate::solve::explicit::State;
 use crate::system::SemiDiscrete;
 use crate::tensor::{AXES, Vector};
@@ -27,10 +28,14 @@ impl Tables {
         open: impl Fn(&str, Vec<String>, usize) -> Result<CsvTable, ObserveError>,
     ) -> Result<Self, ObserveError> {
         let when = || ["step", "time"].map(str::to_owned).into_iter();
-        let of_tip = AXES[..D].iter().chain(&["damage"]).map(|&h| h.to_owned());
-        let of_tip: Vec<String> = when().chain(of_tip).collect();
+        let of_tip = |tip: &Tip<D>| -> Vec<String> {
+            let place = AXES[..D].iter().chain(&["damage"]);
+            let integrals = INTEGRALS.iter().filter(|_| tip.domains.is_some());
+            let columns = place.chain(integrals).map(|&h| h.to_owned());
+            when().chain(columns).collect()
+        };
         let tips = output.tips.iter().enumerate();
-        let tips = tips.map(|(i, tip)| open(&format!("tip_{}", tip.name), of_tip.clone(), i));
+        let tips = tips.map(|(i, tip)| open(&format!("tip_{}", tip.name), of_tip(tip), i));
         let of_line: Vec<String> = when().chain(table_header::<D>(&output.fields)).collect();
         let lines = output.lines.iter().zip(output.tips.len()..);
         let lines = lines.map(|((name, _), i)| open(name, of_line.clone(), i));
@@ -45,13 +50,13 @@ impl Tables {
         self.tips.iter().chain(&self.lines)
     }
 
-    /// Appends the tips of a state, as far as points are damaged; a table has its header before.
+    /// Appends the tips of a state, as far as points are damaged or `integrals` are known there; a table has its header before.
     ///
     /// # Errors
     /// [`ObserveError`] if a row cannot be written.
     pub fn tips<const D: usize>(
         &mut self,
-        output: &Output<D>,
+        (output, integrals): (&Output<D>, &[Option<TipSummary>]),
         options: &RunOptions<'_>,
         (state, system): (&State, &dyn SemiDiscrete),
         may_be_damaged: bool,
@@ -64,16 +69,22 @@ impl Tables {
             self.tips.iter_mut().try_for_each(CsvTable::begin)?;
         }
         let body = system.body_state().filter(|_| may_be_damaged);
-        let Some(damage) = body.and_then(|body| body.damage()) else {
-            return Ok(());
-        };
-        for (tip, table) in output.tips.iter().zip(&mut self.tips) {
-            let Some(site) = farthest(tip, &damage, &positions) else {
+        let damage = body.and_then(|body| body.damage());
+        for (k, (tip, table)) in output.tips.iter().zip(&mut self.tips).enumerate() {
+            let damaged = damage.as_ref().and_then(|damage| {
+                let site = farthest(tip, damage, &positions)?;
+                Some((positions(site), damage[site]))
+            });
+            let whole = tip.domains.as_ref().map(|domains| (domains.tip, 0.0));
+            let Some((x, damage)) = damaged.or(whole) else {
                 continue;
             };
             let mut row = when(state);
-            row.extend(positions(site).iter().map(|&x| Entry::from(x)));
-            row.push(damage[site].into());
+            row.extend(x.iter().copied().chain([damage]).map(Entry::from));
+            if tip.domains.is_some() {
+                let found = integrals.get(k).and_then(Option::as_ref);
+                row.extend(of_integrals(found));
+            }
             options.keep(&format!("tip_{}", tip.name), table, &row)?;
         }
         Ok(())
@@ -106,6 +117,28 @@ impl Tables {
         }
         Ok(())
     }
+}
+
+/// Columns of the integrals at a tip.
+const INTEGRALS: [&str; 6] = [
+    "energy_release_rate",
+    "stress_intensity_1",
+    "stress_intensity_2",
+    "energy_release_rate_spread",
+    "stress_intensity_1_spread",
+    "stress_intensity_2_spread",
+];
+
+/// Entries of the integrals at a tip; empty ones where its rings leave the body.
+fn of_integrals(found: Option<&TipSummary>) -> Vec<Entry> {
+    let Some(tip) = found else {
+        return vec![Entry::from(""); INTEGRALS.len()];
+    };
+    let ([k1, k2], [of_k1, of_k2]) = (tip.stress_intensity, tip.stress_intensity_spread);
+    let (rate, of_rate) = (tip.energy_release_rate, tip.energy_release_rate_spread);
+    [rate, k1, k2, of_rate, of_k1, of_k2]
+        .map(Entry::from)
+        .to_vec()
 }
 
 /// The first entries of a row.

@@ -170,7 +170,7 @@ impl<'a, const D: usize> SceneDrive<'a, D> {
             return Ok(self);
         };
         let rows = (operator, None);
-        if thermal.temperature.value.depends_on_time() {
+        if thermal.temperature.varies_in_time() {
             let rows = thermal.rows(self.model, rows, !is_linear)?;
             self.heat = Some((thermal, rows));
         } else {

@@ -14,6 +14,7 @@ use super::saved::{EdgeReached, Saved, SavedZone, StepChoice, Written};
 use super::section_rows::SectionRows;
 use super::supports::Supports;
 use super::tables::Tables;
+use super::tips::farthest;
 use crate::model::{Model, Sampler};
 use crate::observe::ObserveError;
 use crate::observe::checkpoint::{CheckpointFile, Pace};
@@ -21,7 +22,9 @@ use crate::observe::csv::{CsvTable, Entry};
 use crate::observe::pieces::agreed;
 use crate::observe::series::Series;
 use crate::observe::summary::{ConditionForce, SectionForce};
+use crate::observe::tip_summary::TipSummary;
 use crate::run::condition_terms::ConditionTerms;
+use crate::run::energy_release;
 use crate::run::error::RunError;
 use crate::run::field_probes;
 use crate::run::motion::seen::Seen;
@@ -30,7 +33,7 @@ use crate::run::setup::RunSettings;
 use crate::run::solution::Solved;
 use crate::run::write::{Remembered, Shown, snapshot};
 use crate::scene::conditions::Condition;
-use crate::scene::validated::Output;
+use crate::scene::validated::{Output, Tip};
 use crate::solve::explicit::{Explicit, State};
 use crate::system::SemiDiscrete;
 use crate::tensor::{AXES, Vector};
@@ -133,6 +136,8 @@ pub struct Recorder<'a, const D: usize> {
     pub growth: CrackGrowth,
     /// Number of broken bonds, and the area of the cracks that they have left.
     cracks: (u64, f64),
+    /// Integrals at the tips of the present state, one for each; empty where the scene asks for none.
+    pub tips: Vec<Option<TipSummary>>,
     /// Seconds that writing took.
     pub seconds: f64,
 }
@@ -184,6 +189,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             last: EnergyRow::default(),
             growth: written.map_or_else(CrackGrowth::default, |w| w.growth),
             cracks: (0, 0.0),
+            tips: Vec::new(),
             seconds: 0.0,
         })
     }
@@ -324,7 +330,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         self.options.keep("history", &mut self.history, &row)?;
         let may_be_damaged = state.broken > 0 || self.breaks == Breaks::Gradually;
         self.tables.tips(
-            self.output,
+            (self.output, &self.tips),
             &self.options,
             (state, *system),
             may_be_damaged,
@@ -332,6 +338,23 @@ impl<'a, const D: usize> Recorder<'a, D> {
         )?;
         self.seconds += begun.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    /// Returns true if the scene asks for integrals at the tip of a crack.
+    pub fn integrates_at_tips(&self) -> bool {
+        self.output.tips.iter().any(|tip| tip.domains.is_some())
+    }
+
+    /// Integrates over the rings around the tips of a moment, which lie where its damage ends. Collective where families are spread.
+    pub fn find_tips(&mut self, moment: &Moment<'_>, solved: &Solved<'_, D>) {
+        let is_damaged = moment.state.broken > 0 || self.breaks == Breaks::Gradually;
+        let damage = solved.moved.damage.filter(|_| is_damaged);
+        let sites = &solved.model.sites;
+        let grown = |tip: &Tip<D>| {
+            let site = farthest(tip, damage?, |site| sites[site].position)?;
+            Some(sites[site].position)
+        };
+        self.tips = energy_release::of_tips(solved, self.output, self.options.ranks, grown);
     }
 
     /// Damage of a moment, where bonds may break or lose their stiffness.

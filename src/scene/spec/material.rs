@@ -17,7 +17,7 @@ use crate::peridynamics::failure::{self, FailureCriterion};
 use crate::peridynamics::laws::Named;
 use crate::peridynamics::{BondWeights, PartialVolume};
 use crate::scene::expression::Expression;
-use crate::scene::value::{Coordinates, Number};
+use crate::scene::value::{Coordinates, Number, Text};
 
 /// A material: its peridynamic law, beside which the local law is linear elasticity with the same constants.
 #[derive(Clone, Debug)]
@@ -34,6 +34,14 @@ impl MaterialSpec {
         match self {
             Self::Named(m) => m.thermal_expansion.as_ref(),
             Self::Umat(m) => m.thermal_expansion.as_ref(),
+        }
+    }
+
+    /// Thermal conductivity and heat capacity per volume, where they are typed.
+    pub fn conduction(&self) -> [Option<&Number>; 2] {
+        match self {
+            Self::Named(m) => [m.conductivity.as_ref(), m.heat_capacity.as_ref()],
+            Self::Umat(m) => [m.conductivity.as_ref(), m.heat_capacity.as_ref()],
         }
     }
 }
@@ -173,8 +181,8 @@ pub struct PeridynamicsSpec {
     #[schemars(with = "Option<super::motion::CalibrationSpec>")]
     pub calibration: Option<toml::Spanned<super::motion::CalibrationSpec>>,
     /// Treatment of bonds across the mesh's own boundary (a hole, a notch); "cut" if left out.
-    #[serde(default)]
-    pub surfaces: Surfaces,
+    #[schemars(with = "Option<Surfaces>")]
+    pub surfaces: Option<toml::Spanned<Surfaces>>,
 }
 
 impl PeridynamicsSpec {
@@ -193,6 +201,24 @@ pub enum PointsSpec {
     Cells,
     /// A regular lattice that fills the zone.
     Lattice(LatticeSpec),
+    /// Those of a file, which are the whole body: the scene has no `mesh` then, and no finite elements.
+    File(PointFileSpec),
+}
+
+/// Points from a file, each with its volume.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct PointFileSpec {
+    /// The file, relative to the scene: a table whose first line names its columns, or a VTK file (`.vtk`, `.vtu`) whose points are the points.
+    pub path: Text,
+    /// The column of the coordinate x; "x" if left out.
+    pub x: Option<Text>,
+    /// The column of the coordinate y; "y" if left out.
+    pub y: Option<Text>,
+    /// The column of the coordinate z; "z" if left out.
+    pub z: Option<Text>,
+    /// The column, or the array of the points, of the volume (in the plane the area, of a bar the length); "volume" if left out.
+    pub volume: Option<Text>,
 }
 
 /// A regular lattice of points.

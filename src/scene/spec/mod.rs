@@ -9,11 +9,13 @@
 //! | `material_interface.rs` | bonds between two materials |
 //! | `region.rs` | shapes and zones |
 //! | `condition.rs`, `impactor.rs` | conditions and voids, rigid impactors |
+//! | `conduction.rs` | heat conduction |
 //! | `motion.rs` | time and load steps, initial fields, deformation and fracture of bonds |
 //! | `control.rs` | solver and output |
 //! | `table.rs` | tables of numbers |
 
 mod condition;
+mod conduction;
 mod control;
 mod impactor;
 mod influence;
@@ -31,13 +33,17 @@ pub use super::coupling_kinds::{
     NonlocalSpec, PartialStressSpec, SpliceSpec, TruncatedSpec, ZonesNeeded,
 };
 pub use condition::{TemperatureSpec, VoidSpec};
+pub use conduction::{
+    ConductionSpec, HeatConditionSpec, HeatFluxSpec, HeatSourceSpec, HeatTransferSpec,
+    HeldTemperatureSpec,
+};
 pub use control::{
     LineSpec, OutputSpec, PointOutputSpec, ProbeSpec, SectionSpec, SolverSpec, StressSpec,
     UnprovenSpec, WarningsSpec,
 };
 pub use impactor::{CylinderSpec, ImpactorMotionSpec, ImpactorSpec, PlaneSpec, SphereSpec};
 pub use influence::{InfluenceSpec, MicromodulusSpec, PolynomialSpec};
-pub use material::{LatticeSpec, MaterialSpec, PeridynamicsSpec, PointsSpec};
+pub use material::{LatticeSpec, MaterialSpec, PeridynamicsSpec, PointFileSpec, PointsSpec};
 pub use material_interface::MaterialInterfaceSpec;
 pub use mesh::{
     AxisSpec, BoxMeshSpec, CutoutSpec, FileMeshSpec, GradedSpec, LineMeshSpec, MergeSpec, MeshSpec,
@@ -82,8 +88,8 @@ pub struct SceneSpec {
     /// Kinematic assumption by which the body represents a three-dimensional solid; fixes the dimension.
     #[schemars(with = "Kinematics")]
     pub kinematics: Spanned<Kinematics>,
-    /// The mesh: generated, or read from a file.
-    pub mesh: MeshSpec,
+    /// The mesh: generated, or read from a file; none where the points of a file are the whole body.
+    pub mesh: Option<MeshSpec>,
     /// The materials by name. At most one of several may be without `cells`: it fills what the others leave.
     pub materials: BTreeMap<Text, MaterialSpec>,
     /// Bonds between two materials of the points, by name; those of two that none names have the harmonic mean of their stiffnesses and the smaller critical stretch.

@@ -185,4 +185,9 @@ pub struct TipSpec {
     pub inside: Option<ShapeSpec>,
     /// Damage from which a point counts; 0.35 if left out.
     pub threshold: Option<Number>,
+    /// Energy release rate and stress intensity factors at the tip, of a plane scene at rest or in load steps; none if left out.
+    pub energy_release: Option<bool>,
+    /// Radii of the rings over which these are integrated, from the smallest to the largest \[m\]; 2, 3, 4 and 5 horizons if left out.
+    #[serde(default)]
+    pub radii: Vec<Number>,
 }

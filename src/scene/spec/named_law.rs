@@ -25,6 +25,10 @@ pub struct NamedSpec {
     pub density: Option<Number>,
     /// Linear thermal expansion per degree.
     pub thermal_expansion: Option<Number>,
+    /// Thermal conductivity.
+    pub conductivity: Option<Number>,
+    /// Heat capacity per volume.
+    pub heat_capacity: Option<Number>,
     /// Shape of the stiffness of a bond over its length, of a law that has a choice.
     pub micromodulus: Option<MicromodulusSpec>,
     /// Criteria by which bonds break, each with its number.
@@ -45,13 +49,21 @@ pub enum Given {
 }
 
 /// Keys that materials of all laws have, with what they are.
-const COMMON: [(&str, &str); 6] = [
+const COMMON: [(&str, &str); 8] = [
     ("youngs-modulus", "Young's modulus E."),
     ("poisson-ratio", "Poisson's ratio."),
     ("density", "Density."),
     (
         "thermal-expansion",
         "Linear thermal expansion α per degree, with `[temperature]`.",
+    ),
+    (
+        "conductivity",
+        "Thermal conductivity k, with `[temperature.conduction]`.",
+    ),
+    (
+        "heat-capacity",
+        "Heat capacity per volume ρ c, with `[temperature.conduction]` that has `initial`.",
     ),
     (
         "micromodulus",
@@ -153,6 +165,8 @@ impl<'de> Visitor<'de> for Seed {
             poisson_ratio,
             density: taken("density"),
             thermal_expansion: taken("thermal-expansion"),
+            conductivity: taken("conductivity"),
+            heat_capacity: taken("heat-capacity"),
             micromodulus,
             failure,
             cells,

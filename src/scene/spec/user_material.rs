@@ -23,6 +23,10 @@ pub struct UmatSpec {
     pub density: Option<Number>,
     /// Linear thermal expansion α per degree, with `[temperature]`: the routine gets the strain that is left.
     pub thermal_expansion: Option<Number>,
+    /// Thermal conductivity k, with `[temperature.conduction]`.
+    pub conductivity: Option<Number>,
+    /// Heat capacity per volume ρ c, with `[temperature.conduction]` that has `initial`.
+    pub heat_capacity: Option<Number>,
     /// PROPS, the numbers that the routine takes.
     #[serde(default)]
     pub constants: Vec<Number>,

@@ -32,11 +32,13 @@ pub fn is_small(spec: &SceneSpec) -> bool {
 
 fn cells_and_points_are_few(spec: &SceneSpec) -> bool {
     let (min, max, axes) = match &spec.mesh {
-        MeshSpec::Line(m) => (&m.min, &m.max, vec![&m.x]),
-        MeshSpec::Rectangle(m) => (&m.min, &m.max, vec![&m.x, &m.y]),
-        MeshSpec::Box(m) => (&m.min, &m.max, vec![&m.x, &m.y, &m.z]),
+        Some(MeshSpec::Line(m)) => (&m.min, &m.max, vec![&m.x]),
+        Some(MeshSpec::Rectangle(m)) => (&m.min, &m.max, vec![&m.x, &m.y]),
+        Some(MeshSpec::Box(m)) => (&m.min, &m.max, vec![&m.x, &m.y, &m.z]),
         // the meshes at hand have up to 806 cells, and reach up to 4
-        MeshSpec::File(_) => return points(spec, &[4.0, 2.0, 2.0]),
+        Some(MeshSpec::File(_)) => return points(spec, &[4.0, 2.0, 2.0]),
+        // refused, or the points of a file, of which none are at hand
+        None => return true,
     };
     let lengths = lengths(min, max);
     let cells: f64 = axes

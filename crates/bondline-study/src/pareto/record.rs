@@ -10,7 +10,7 @@ use crate::pareto::parameters::{Case, TradeError};
 use crate::variants::{Measured, Quantity};
 use bondline::observe::checkpoint::Fingerprint;
 use bondline::regular_file;
-use bondline::scene::spec::MeshSpec;
+use bondline::scene::spec::{MeshSpec, PointsSpec};
 use bondline::scene::{SceneSpec, Source};
 
 /// The first line of a record: what its errors belong to.
@@ -37,7 +37,7 @@ pub(super) fn program(path: &Path) -> Result<String, TradeError> {
     Ok(format!("{} {sum:08x}", env!("CARGO_PKG_VERSION")))
 }
 
-/// A number for the bytes of the mesh file that a scene reads with these overrides; none where it makes its mesh itself, or would be refused.
+/// A number for the bytes of the file of a mesh or of points that a scene reads with these overrides; none where it makes its mesh itself, or would be refused.
 ///
 /// Shapes: `scene` lies in `folder`, from which the path of the mesh counts.
 pub(super) fn mesh(scene: &Source, folder: &Path, overrides: &[String]) -> Option<u64> {
@@ -46,10 +46,13 @@ pub(super) fn mesh(scene: &Source, folder: &Path, overrides: &[String]) -> Optio
         source.push_override(o).ok()?;
     }
     let spec = SceneSpec::parse(&source).ok()?;
-    let MeshSpec::File(file) = &spec.mesh else {
-        return None;
+    let points = spec.peridynamics.as_ref().and_then(|p| p.points.as_ref());
+    let path = match (&spec.mesh, points) {
+        (Some(MeshSpec::File(file)), _) => &file.path,
+        (None, Some(PointsSpec::File(file))) => &file.path,
+        _ => return None,
     };
-    let bytes = regular_file::read(&folder.join(&file.path.value)).ok()?;
+    let bytes = regular_file::read(&folder.join(&path.value)).ok()?;
     let mut print = Fingerprint::default();
     print.add(&bytes);
     Some(print.value())

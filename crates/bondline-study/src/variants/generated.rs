@@ -1,6 +1,6 @@
 //! Generated meshes of scenes, as their knobs see them.
 
-use bondline::scene::spec::{AxisSpec, MeshSpec};
+use bondline::scene::spec::{AxisSpec, MeshSpec, SceneSpec};
 
 /// A generated mesh: the table's name, its corners, its axes.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,8 +29,8 @@ pub(super) enum Axis {
     Graded { spacing: f64, largest: Option<f64> },
 }
 
-/// The generated mesh of a scene; none for one from a file.
-pub(super) fn generated(mesh: &MeshSpec) -> Option<Generated> {
+/// The generated mesh of a scene; none for one from a file, or for points from one.
+pub(super) fn generated(spec: &SceneSpec) -> Option<Generated> {
     let axis = |a: &AxisSpec| match a {
         AxisSpec::Cells(n) => Axis::Cells(n.value),
         AxisSpec::Spacing(s) => Axis::Spacing(s.value),
@@ -39,7 +39,7 @@ pub(super) fn generated(mesh: &MeshSpec) -> Option<Generated> {
             largest: g.largest.as_ref().map(|l| l.value),
         },
     };
-    Some(match mesh {
+    Some(match spec.mesh.as_ref()? {
         MeshSpec::Line(m) => Generated {
             shape: "line",
             min: m.min.values.clone(),

@@ -89,7 +89,7 @@ enum Grown {
 impl Base {
     pub(crate) fn of(spec: &SceneSpec) -> Self {
         let pd = spec.peridynamics.as_ref();
-        let cell = || generated(&spec.mesh).as_ref().and_then(Generated::cell);
+        let cell = || generated(spec).as_ref().and_then(Generated::cell);
         let horizon = pd.and_then(|p| match (&p.horizon, &p.points) {
             (Some(typed), _) => typed.as_constant(),
             (None, Some(PointsSpec::Lattice(l))) => Some(RATIO * l.spacing.value),
@@ -99,7 +99,7 @@ impl Base {
             Some(PointsSpec::Lattice(l)) => {
                 Some((l.spacing.value, l.origin.as_ref().map(|o| o.values.clone())))
             }
-            Some(PointsSpec::Cells) => None,
+            Some(PointsSpec::Cells | PointsSpec::File(_)) => None,
             // where the lattice is that of the cells, the two are one
             None => {
                 let horizon = horizon?;
@@ -118,7 +118,7 @@ impl Base {
             ),
             horizon,
             lattice,
-            mesh: generated(&spec.mesh),
+            mesh: generated(spec),
             nonlocal: spec
                 .zones
                 .nonlocal
@@ -505,10 +505,10 @@ pub(crate) fn coordinates(x: &[f64]) -> String {
 /// Corners of the cut-outs of a generated mesh.
 pub(crate) fn cutouts(spec: &SceneSpec) -> Vec<(Vec<f64>, Vec<f64>)> {
     let cutouts = match &spec.mesh {
-        MeshSpec::Line(m) => &m.cutouts,
-        MeshSpec::Rectangle(m) => &m.cutouts,
-        MeshSpec::Box(m) => &m.cutouts,
-        MeshSpec::File(_) => return Vec::new(),
+        Some(MeshSpec::Line(m)) => &m.cutouts,
+        Some(MeshSpec::Rectangle(m)) => &m.cutouts,
+        Some(MeshSpec::Box(m)) => &m.cutouts,
+        Some(MeshSpec::File(_)) | None => return Vec::new(),
     };
     let corners = cutouts.values();
     corners
@@ -518,7 +518,7 @@ pub(crate) fn cutouts(spec: &SceneSpec) -> Vec<(Vec<f64>, Vec<f64>)> {
 
 /// Corners of a generated mesh.
 pub(crate) fn corners(spec: &SceneSpec) -> Option<(Vec<f64>, Vec<f64>)> {
-    generated(&spec.mesh).map(|m| (m.min, m.max))
+    generated(spec).map(|m| (m.min, m.max))
 }
 
 /// A knob that turns a key of the scene: `solver.tolerance=[1e-4, 1e-8]`.

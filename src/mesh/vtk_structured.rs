@@ -1,8 +1,12 @@
-//! Images of VTK, boxes along the axes with integers per cell: a picture of voxels is a mesh.
+//! Grids of VTK in rows, columns and layers: images, boxes along the axes with integers per cell, whose voxels are cells; rectilinear grids, whose planes
+//! have coordinates of their own; structured grids, whose points lie anywhere.
 
 use std::array::from_fn;
 
 use super::vtk_grid::Grid;
+
+/// The most cells of a grid: planes of a rectilinear one announce far more than they take in the file.
+const MOST_CELLS: u64 = 100_000_000;
 
 /// Place and size of the voxels of an image.
 #[derive(Clone, Copy, Debug)]
@@ -45,32 +49,53 @@ impl Extent {
     /// From the text of an attribute; none if it is no extent along x and y at least.
     pub fn parse(text: &str) -> Option<Self> {
         let all: [i64; 6] = numbers(text)?;
-        let extent = Self(from_fn(|k| [all[2 * k], all[2 * k + 1]]));
+        Self::of(from_fn(|k| [all[2 * k], all[2 * k + 1]]))
+    }
+
+    fn of(planes: [[i64; 2]; 3]) -> Option<Self> {
+        let extent = Self(planes);
         let far = 1 << 40;
         let is_fine = |&[low, high]: &[i64; 2]| low.abs() < far && high.abs() < far && low <= high;
         let is_flat = |k: usize| extent.0[k][0] == extent.0[k][1];
         (extent.0.iter().all(is_fine) && !is_flat(0) && !is_flat(1)).then_some(extent)
     }
 
-    /// Cells along each axis; of a plane image none along z.
+    /// Cells along each axis; of a plane grid none along z.
     fn cells(&self) -> [u64; 3] {
         self.0.map(|[low, high]| low.abs_diff(high))
     }
 
-    /// Number of cells; none of an image that is too large to count.
+    /// Number of cells; none of a grid of more than can be a mesh.
     pub fn count(&self) -> Option<u64> {
         let [x, y, z] = self.cells();
-        x.checked_mul(y)?.checked_mul(z.max(1))
+        let all = x.checked_mul(y)?.checked_mul(z.max(1))?;
+        (all <= MOST_CELLS).then_some(all)
+    }
+
+    /// Planes along each axis.
+    pub fn planes(&self) -> [u64; 3] {
+        self.cells().map(|n| n + 1)
     }
 
     /// Number of points.
     pub fn points(&self) -> u64 {
-        self.cells().iter().map(|n| n + 1).product()
+        self.planes().iter().product()
+    }
+
+    /// The extent from the first plane on of a grid with so many points along each axis; none if it has no cells along x and y at least.
+    pub fn of_counts(counts: [u64; 3]) -> Option<Self> {
+        let last = |n: u64| i64::try_from(n).ok()?.checked_sub(1);
+        let [x, y, z] = counts.map(last);
+        Self::of([[0, x?], [0, y?], [0, z?]])
     }
 
     /// The grid of the piece, whose values per cell have been read.
-    pub fn grid(&self, image: Image, mut grid: Grid) -> Grid {
+    ///
+    /// # Errors
+    /// The number of points, in words, where the geometry has another one.
+    pub fn grid(&self, geometry: &Geometry, mut grid: Grid) -> Result<Grid, String> {
         let [nx, ny, nz] = self.cells();
+        geometry.fits(self)?;
         let point = |[i, j, k]: [u64; 3]| i + (nx + 1) * (j + (ny + 1) * k);
         let kind = if nz == 0 { PIXEL } else { VOXEL };
         for k in 0..nz.max(1) {
@@ -89,14 +114,53 @@ impl Extent {
                 for i in 0..=nx {
                     let at = [i, j, k];
                     grid.used.push(point(at));
-                    grid.coordinates.push(from_fn(|a| {
-                        let plane = self.0[a][0] + at[a] as i64;
-                        image.origin[a] + image.spacing[a] * plane as f64
-                    }));
+                    grid.coordinates.push(match geometry {
+                        Geometry::Image(image) => from_fn(|a| {
+                            let plane = self.0[a][0] + at[a] as i64;
+                            image.origin[a] + image.spacing[a] * plane as f64
+                        }),
+                        Geometry::Planes(planes) => from_fn(|a| planes[a][at[a] as usize]),
+                        Geometry::Points(points) => points[point(at) as usize],
+                    });
                 }
             }
         }
-        grid
+        Ok(grid)
+    }
+}
+
+/// The places of the points of a grid of rows, columns and layers.
+pub(super) enum Geometry {
+    /// Evenly spaced.
+    Image(Image),
+    /// Along each axis a coordinate for each plane.
+    Planes([Vec<f64>; 3]),
+    /// Anywhere; x runs fastest, z slowest.
+    Points(Vec<[f64; 3]>),
+}
+
+impl Geometry {
+    /// Refuses another number of points than an extent has.
+    fn fits(&self, extent: &Extent) -> Result<(), String> {
+        match self {
+            Self::Image(_) => Ok(()),
+            Self::Planes(planes) => {
+                let wanted = extent.planes();
+                let found = [0, 1, 2].map(|a| planes[a].len() as u64);
+                match found == wanted {
+                    true => Ok(()),
+                    false => Err(format!("{found:?} planes of an extent of {wanted:?}")),
+                }
+            }
+            Self::Points(points) => match points.len() as u64 == extent.points() {
+                true => Ok(()),
+                false => Err(format!(
+                    "{} points of an extent of {}",
+                    points.len(),
+                    extent.points()
+                )),
+            },
+        }
     }
 }
 
