@@ -23,7 +23,7 @@ pub fn nodal_volumes<const D: usize>(
 /// Hands the share of each node of cell `c` in its volume to `add`, perhaps in pieces, as a fraction of a volume \[m^D\]: `∫ N_a dV` of a linear cell.
 ///
 /// Those integrals are zero or negative at corners of cells of second order. Their shares are in the ratio of the diagonal of the consistent mass, `∫ N_a² dV / Σ_b ∫ N_b² dV` of the volume: positive, and of the same sum. Of a simplex
-/// of which a part is left see [`share_parts`].
+/// of which a part is left corners have the integrals of linear shape functions, and the nodes in the middle of edges take as much from both ends.
 ///
 /// Source: \[HintonRockZienkiewicz1976\].
 pub fn for_each_share<const D: usize>(

@@ -50,6 +50,38 @@ fn forces_out_of_balance_are_told_with_what_they_do_to_displacements() {
 }
 
 #[test]
+fn kinds_of_warnings_are_left_out_or_denied() {
+    let set = |key: &str, code: &str| format!("warnings.{key}=[\"{code}\"]");
+    assert!(told(ARM, &[], "out of balance").is_some());
+    let allowed = set("allow", "W32");
+    assert_eq!(told(ARM, &["--set", &allowed], "out of balance"), None);
+    // what only the solution shows is denied at the end, with its results written
+    let case = Case::new(ARM);
+    let output = case.command("run", &["--json", "--set", &set("deny", "W32")]);
+    assert_eq!(output.status.code(), Some(1));
+    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a summary");
+    let list = summary["warnings"].as_array().expect("warnings");
+    let denied = list
+        .iter()
+        .find(|w| w["code"] == "W32")
+        .expect("it is told");
+    assert_eq!(denied["denied"], true);
+    assert_eq!(denied["quantity"], "displacement");
+    assert_eq!(denied["remedies"][0][0], "coupling=truncated");
+    assert!(denied["effect"].as_f64().is_some_and(|part| part > 0.1));
+    assert_eq!(case.read("out/arm_probes.csv").lines().count(), 2);
+    // what the model shows is denied before
+    let case = Case::new(ARM);
+    let surfaces = ["--set", "coupling=nonlocal", "--set", &set("deny", "W13")];
+    let said = case.run(&surfaces).expect_err("it is denied");
+    assert!(said.contains("warnings.deny has W13"), "{said}");
+    let output = case.command("run", &["--set", &set("deny", "W99")]);
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("W99") && said.contains("W32"), "{said}");
+}
+
+#[test]
 fn a_truncated_seam_across_a_temperature_is_not_told_to_be_truncated() {
     let scene = r#"
 kinematics = "plane-stress"
