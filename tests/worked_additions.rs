@@ -149,9 +149,11 @@ fn packages(root: &Path) -> Files {
     }
     let lock = fs::read_to_string(root.join("Cargo.lock")).unwrap();
     files.insert("Cargo.lock".into(), lock);
-    let reference = Path::new("docs/scene.md");
-    let keys = fs::read_to_string(root.join(reference)).unwrap();
-    files.insert(reference.into(), keys);
+    // the reference, and the page that the library holds
+    for page in ["docs/scene.md", "docs/manual/warnings.md"] {
+        let text = fs::read_to_string(root.join(page)).unwrap();
+        files.insert(page.into(), text);
+    }
     let program = Path::new("src/bin").join(NAME).with_extension("rs");
     files.insert(program, PROGRAM.to_owned());
     files
