@@ -144,8 +144,10 @@
 //!         tensors: vec![Tensor4::isotropic(1.0, 1.0)],
 //!         material: vec![0; 30],
 //!         of_points: 0,
+//!         turned: Default::default(),
 //!     },
 //!     peridynamics: Some(Peridynamics {
+//!         horizon_change: Default::default(),
 //!         law: Arc::new(BondBased::new(Micromodulus::Constant, 1.0)),
 //!         horizon: HorizonField::Uniform(3.0),
 //!         points: PointSource::Cells,

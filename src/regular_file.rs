@@ -38,6 +38,14 @@ pub fn read_to_string(path: &Path) -> Result<String> {
     String::from_utf8(read(path)?).map_err(|e| Error::new(ErrorKind::InvalidData, e.utf8_error()))
 }
 
+/// The remedy for a text that cannot be read: another encoding for what is no text, else `otherwise`.
+pub fn remedy(error: &Error, otherwise: &'static str) -> &'static str {
+    match error.kind() {
+        ErrorKind::InvalidData => "save it as text in UTF-8",
+        _ => otherwise,
+    }
+}
+
 /// The longest scene that is read \[bytes\].
 const LONGEST_SCENE: u64 = 64 << 20;
 

@@ -94,6 +94,39 @@ impl<const D: usize> Tensor4<D> {
         })
     }
 
+    /// The same tensor of a body that is turned: `C'_ijkl = Q_ia Q_jb Q_kc Q_ld C_abcd`, with the minor and major symmetries of a stiffness to the last digit.
+    pub fn turned(&self, q: &Tensor<D>) -> Self {
+        let mut c = *self;
+        for _ in 0..4 {
+            // one index at a time, which becomes the last
+            let old = c;
+            c = Self::from_fn(|b, c, d, i| (0..D).map(|a| q[(i, a)] * old.get(a, b, c, d)).sum());
+        }
+        let minor = Self::from_fn(|i, j, k, l| {
+            0.25 * ((c.get(i, j, k, l) + c.get(j, i, k, l))
+                + (c.get(i, j, l, k) + c.get(j, i, l, k)))
+        });
+        Self::from_fn(|i, j, k, l| 0.5 * (minor.get(i, j, k, l) + minor.get(k, l, i, j)))
+    }
+
+    /// Lamé's parameters (λ, μ) of the isotropic tensor that is nearest in the sum of squares of all components; its own of an isotropic one.
+    pub fn isotropic_part(&self) -> (f64, f64) {
+        let d = D as f64;
+        let pairs = || (0..D).flat_map(|i| (0..D).map(move |j| (i, j)));
+        let bulk: f64 = pairs().map(|(i, j)| self.get(i, i, j, j)).sum();
+        if D == 1 {
+            return (bulk / 3.0, bulk / 3.0);
+        }
+        let all: f64 = pairs().map(|(i, j)| self.get(i, j, i, j)).sum();
+        let mu = (d * all - bulk) / (d * (d + 2.0) * (d - 1.0));
+        ((bulk - 2.0 * d * mu) / (d * d), mu)
+    }
+
+    /// The largest stress along an axis under a unit stretch along it with held sides, `C_iiii`: λ + 2 μ of an isotropic tensor.
+    pub fn longitudinal_modulus(&self) -> f64 {
+        (0..D).map(|i| self.get(i, i, i, i)).fold(0.0, f64::max)
+    }
+
     /// Returns the stress under a unit stretch along the first axis with free sides, of an isotropic C: Young's modulus, in plane strain over 1 − ν².
     pub fn uniaxial_modulus(&self) -> f64 {
         let (along, across) = (self.get(0, 0, 0, 0), self.get(0, 0, D - 1, D - 1));
@@ -226,6 +259,19 @@ mod tests {
                 assert!((found - expected).abs() <= 1e-13 * t.norm(), "{values:?}");
             }
         }
+    }
+
+    #[test]
+    fn the_isotropic_part_of_an_isotropic_tensor_is_its_own() {
+        let near = |(a, b): (f64, f64), (c, d): (f64, f64)| (a - c).abs() + (b - d).abs() < 1e-14;
+        assert!(near(
+            Tensor4::<2>::isotropic(1.7, 0.4).isotropic_part(),
+            (1.7, 0.4)
+        ));
+        assert!(near(
+            Tensor4::<3>::isotropic(-0.2, 0.9).isotropic_part(),
+            (-0.2, 0.9)
+        ));
     }
 
     #[test]

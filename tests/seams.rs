@@ -95,7 +95,7 @@ fn two_lattices_with_a_layer_stretch_as_one() {
 fn bodies_that_cannot_be_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     for (overrides, wanted) in [
-        (&["coupling=splice"][..], "truncated"),
+        (&["peridynamics.horizon-change=dual"][..], "truncated"),
         (
             &["zones.bodies.fine.spacing=0.2"][..],
             "zones.bodies.fine.horizon",

@@ -253,7 +253,7 @@ fn what_materials_do_not_share_is_refused_by_name() {
     );
     let said = refusal(&plain.replace(
         "[materials.right.bond-based]",
-        "[materials.right.bond-based]\nmicromodulus = \"constant\"",
+        "[materials.right.bond-based]\nmicromodulus = \"inverted-triangular\"",
     ));
     assert!(
         said.contains("depend on the distance in different ways"),

@@ -69,7 +69,7 @@ fn check_second_call(folder: &Path, study: &[&str], out: &Path, found: &serde_js
 
 /// The scene for the wanted error runs, with the bonds that the front says.
 fn check_wanted_scene(folder: &Path, out: &Path, cases: &[serde_json::Value]) {
-    let scene = out.join("plate-0.05.toml");
+    let scene = out.join("plate-chosen.toml");
     let text_of_scene = std::fs::read_to_string(&scene).unwrap();
     assert!(text_of_scene.starts_with("# "), "{text_of_scene}");
     let run = bondline(
@@ -109,8 +109,8 @@ fn a_study_finds_a_front_goes_on_and_writes_the_scene_for_a_wanted_error() {
         "coupling,m,padding",
         "--cost",
         "bond-visits",
-        "--wanted",
-        "0.05",
+        "--want",
+        "displacement=5%",
     ];
     let first = bondline(folder.path(), &study);
     assert!(first.status.success(), "{}", text(&first.stderr));
@@ -145,7 +145,7 @@ fn a_study_finds_a_front_goes_on_and_writes_the_scene_for_a_wanted_error() {
     // another quantity is another study
     let other = bondline(
         folder.path(),
-        &["trade", "plate.toml", "--quantity", "reaction"],
+        &["trade", "plate.toml", "--want", "reaction=1%"],
     );
     assert!(!other.status.success());
     assert!(
@@ -176,8 +176,16 @@ fn what_cannot_be_studied_is_said() {
         (&["--knob", "horizon"][..], "does not apply"),
         (&["--knob", "colour"], "possible values"),
         (&["--vary", "solver.tolerance=1e-4"], "no list"),
-        (&["--quantity", "path.front"], "no `path.front` to compare"),
-        (&["--quantity", "colour"], "no quantity"),
+        (&["--want", "path.front=1%"], "no `path.front` to compare"),
+        (&["--want", "probe:tip.u=1%"], "no `probe.tip.u` to compare"),
+        (&["--want", "colour=1%"], "no quantity"),
+        (&["--want", "probe.tip=1%"], "names no column"),
+        (&["--want", "displacement=0"], "no error above zero"),
+        (
+            &["--reference", "half"],
+            "full-pd, fe, finer, or a scene file",
+        ),
+        (&["--reference", "none.toml"], "none.toml"),
         (&["--budget", "10"], "a time"),
         (&["--set", "coupling=slice"], "did you mean `splice`"),
         (
@@ -242,8 +250,8 @@ fn another_mesh_in_the_same_file_is_another_study() {
             "plate.toml",
             "--vary",
             vary,
-            "--quantity",
-            "reaction",
+            "--want",
+            "reaction=1%",
             "--reference-set",
             "coupling=nonlocal",
             "--output",
@@ -285,4 +293,153 @@ fn another_mesh_in_the_same_file_is_another_study() {
         .collect::<Vec<_>>()
         .join(" ");
     assert!(said.contains("another scene, mesh, reference"), "{said}");
+}
+
+/// A plate on the mesh of a file that is pulled down by its weight; nothing breaks.
+fn hanging_plate(folder: &Path) {
+    let generated =
+        "mesh.rectangle = { min = [0, 0], max = [1, 1], x = { cells = 20 }, y = { cells = 20 } }";
+    let crack = "cracks.edge.segment = { from = [-0.1, 0.51], to = [0.4, 0.51] }\n";
+    assert!(PLATE.contains(generated) && PLATE.contains(crack));
+    let scene = PLATE
+        .replace(generated, "mesh.file = { path = \"m.msh\" }")
+        .replace(crack, "")
+        .replace(
+            "[-1, 0.2], max = [0.8, 0.8]",
+            "[0.2, 0.2], max = [0.8, 0.8]",
+        );
+    let more = "[conditions.weight.body-force]\nx = '0.02*y'\n\
+                [output]\nprobes.tip = { at = [0.9, 0.95] }\nlines.cut = { from = [0.1, 0.5], to = [0.9, 0.5], samples = 21 }\n";
+    std::fs::write(folder.join("plate.toml"), scene + more).unwrap();
+    std::fs::write(folder.join("m.msh"), mesh(20)).unwrap();
+}
+
+/// The errors of a case of two quantities, if it ran.
+fn errors(case: &serde_json::Value) -> Option<[f64; 2]> {
+    let errors = case["outcome"]["ran"]["errors"].as_array()?;
+    Some([0, 1].map(|k| errors[k].as_f64().unwrap()))
+}
+
+/// The study lists the cheapest of each coupling with both errors, found again from all cases.
+fn assert_cheapest(found: &serde_json::Value, cases: &[serde_json::Value]) {
+    let cost = |case: &serde_json::Value| case["outcome"]["ran"]["cost"]["bond_visits"].as_f64();
+    let name = |case: &serde_json::Value| -> String {
+        let settings = case["settings"].as_array().unwrap().iter();
+        let settings: Vec<&str> = settings.map(|s| s.as_str().unwrap()).collect();
+        match settings.is_empty() {
+            true => "the scene".to_owned(),
+            false => settings.join(", "),
+        }
+    };
+    let listed = found["at_equal_error"].as_array().unwrap();
+    let mut couplings: Vec<&str> = cases
+        .iter()
+        .filter(|c| errors(c).is_some())
+        .map(|c| c["coupling"].as_str().unwrap())
+        .collect();
+    couplings.sort_unstable();
+    couplings.dedup();
+    assert_eq!(listed.len(), couplings.len());
+    assert!(couplings.len() > 3, "{couplings:?}");
+    let ratio = |case: &serde_json::Value| errors(case).map(|[a, b]| (a / 0.005).max(b / 0.01));
+    for coupling in couplings {
+        let own = || {
+            cases
+                .iter()
+                .filter(|c| c["coupling"] == coupling && errors(c).is_some())
+        };
+        let met = own().filter(|c| ratio(c).unwrap() <= 1.0);
+        let best = met.min_by(|a, b| cost(a).partial_cmp(&cost(b)).unwrap());
+        let best = best.or_else(|| own().min_by(|a, b| ratio(a).partial_cmp(&ratio(b)).unwrap()));
+        let best = best.unwrap();
+        let is_listed = |l: &serde_json::Value| {
+            let other = cases
+                .iter()
+                .find(|c| name(c) == l.as_str().unwrap())
+                .unwrap();
+            other["coupling"] == coupling && cost(other) == cost(best)
+        };
+        assert!(listed.iter().any(is_listed), "{coupling}: {listed:?}");
+    }
+}
+
+#[test]
+fn couplings_are_compared_at_equal_error_and_at_equal_cost() {
+    let folder = tempfile::tempdir().unwrap();
+    hanging_plate(folder.path());
+    let study = [
+        "trade",
+        "plate.toml",
+        "--knob",
+        "coupling,m",
+        "--cost",
+        "bond-visits",
+        "--want",
+        "probe:tip.u=0.5%",
+        "--want",
+        "line.cut.ux=1%",
+    ];
+    let first = bondline(folder.path(), &study);
+    assert!(first.status.success(), "{}", text(&first.stderr));
+    let said = text(&first.stdout);
+    let found = json(&folder.path().join("out/trade/plate/trade.json"));
+    assert_eq!(
+        found["quantities"],
+        serde_json::json!(["probe.tip.u", "line.cut.ux"])
+    );
+    // nothing breaks: elements of second order are the reference, and those of the file its bound
+    let reference = found["reference"].to_string();
+    assert!(reference.contains("coupling=local"), "{reference}");
+    assert!(reference.contains("mesh.file.order=second"), "{reference}");
+    let cases = found["cases"].as_array().unwrap();
+    let local = cases
+        .iter()
+        .find(|c| c["settings"] == serde_json::json!(["local"]));
+    let bound = errors(local.unwrap()).unwrap();
+    assert_eq!(found["reference_errors"], serde_json::json!(bound));
+    assert!(bound.iter().all(|e| *e > 0.0 && *e < 0.005), "{bound:?}");
+    // elements alone have no points
+    let alone = cases.iter().filter(|c| c["coupling"] == "local");
+    assert_eq!(alone.count(), 1, "{said}");
+    assert_cheapest(&found, cases);
+    assert!(said.contains("chosen: local"), "{said}");
+    let chosen = folder.path().join("out/trade/plate/plate-chosen.toml");
+    let chosen = std::fs::read_to_string(chosen).unwrap();
+    assert!(
+        chosen.starts_with("# local: the cheapest case found"),
+        "{chosen}"
+    );
+}
+
+#[test]
+fn another_scene_is_a_reference() {
+    let folder = tempfile::tempdir().unwrap();
+    hanging_plate(folder.path());
+    let plate = std::fs::read_to_string(folder.path().join("plate.toml")).unwrap();
+    let fine = plate.replace("coupling = \"splice\"", "coupling = \"local\"");
+    std::fs::write(folder.path().join("fine.toml"), fine).unwrap();
+    let study = [
+        "trade",
+        "plate.toml",
+        "--vary",
+        "coupling=[\"local\"]",
+        "--want",
+        "probe.tip.u=1%",
+        "--reference",
+        "fine.toml",
+    ];
+    let output = bondline(folder.path(), &study);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let found = json(&folder.path().join("out/trade/plate/trade.json"));
+    let cases = found["cases"].as_array().unwrap();
+    let error = |k: usize| cases[k]["outcome"]["ran"]["errors"][0].as_f64().unwrap();
+    assert_eq!(
+        cases[1]["settings"],
+        serde_json::json!(["coupling = local"])
+    );
+    assert!(
+        error(1) == 0.0 && error(0) > 0.0,
+        "{}",
+        text(&output.stdout)
+    );
 }

@@ -218,7 +218,7 @@ impl<const D: usize> Parts<'_, D> {
         let model = self.model;
         let material = usize::from(model.peridynamic_material());
         let spacing = model.spacing();
-        let stiffness = model.elastic.tensors[material].get(0, 0, 0, 0) / spacing;
+        let stiffness = model.elastic.tensors[material].longitudinal_modulus() / spacing;
         for face in faces(model).into_iter().filter(Face::has_two_sides) {
             let body = self.body_of(face.cell);
             for (rows, outward) in [(face.above, -1.0), (face.below, 1.0)] {

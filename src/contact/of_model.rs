@@ -127,7 +127,7 @@ impl<const D: usize> Parts<'_, D> {
         let unit = outward / outward.norm();
         let size = self.size(facet, &unit);
         let material = self.model.material_of_cell(facet.cell as usize);
-        let modulus = self.model.elastic.tensors[usize::from(material)].get(0, 0, 0, 0);
+        let modulus = self.model.elastic.tensors[usize::from(material)].longitudinal_modulus();
         let body = self.body_of(facet.cell as usize);
         let (first, stiffness) = (self.facets.len(), modulus / size);
         for piece in pieces::<D>(facet.nodes.len()) {
@@ -192,7 +192,7 @@ impl<const D: usize> Parts<'_, D> {
                 Some(&material) => material,
                 None => model.peridynamic_material(),
             };
-            let modulus = model.elastic.tensors[usize::from(material)].get(0, 0, 0, 0);
+            let modulus = model.elastic.tensors[usize::from(material)].longitudinal_modulus();
             let place = Place {
                 area: site.volume / sizes[s],
                 stiffness: modulus / sizes[s],

@@ -25,8 +25,9 @@ use crate::coupling::second_gradients::{Around, Reached, cells_of, is_simplex, k
 use crate::{
     fem::{self, Rule},
     mesh::Mesh,
+    model::ElasticCells,
     parallel,
-    tensor::{Tensor, Tensor4, Vector, strain},
+    tensor::{Tensor, Vector, strain},
 };
 
 /// Cells per task: a number of its own, so that what a task reuses does not depend on the number of threads.
@@ -40,10 +41,8 @@ const NONE: u32 = u32::MAX;
 pub struct Criteria<'a, const D: usize> {
     /// The mesh of the whole body.
     pub mesh: &'a Mesh<D>,
-    /// Local elastic tensor of each material \[Pa\].
-    pub tensors: &'a [Tensor4<D>],
-    /// Material of each cell, an index into `tensors`.
-    pub cell_material: &'a [u16],
+    /// Local elastic tensors and materials of the cells.
+    pub elastic: &'a ElasticCells<D>,
     /// The material that peridynamic points would have; no other cell is marked.
     pub material: u16,
     /// Horizon at the centre of each cell \[m\].
@@ -115,7 +114,7 @@ impl<const D: usize> Criteria<'_, D> {
         let centre: Vec<Vector<D>> = (0..count).map(|c| mesh.centroid(c)).collect();
         let volume: Vec<f64> = parallel::map(count, 1, |c| mesh.cell_volume(c).abs());
         let energy = |c: usize, e: &Tensor<D>| {
-            let tensor = &self.tensors[self.cell_material[c] as usize];
+            let tensor = self.elastic.tensor(c);
             volume[c] * tensor.contract(e).dot(e)
         };
         let own: Vec<f64> = parallel::map(count, 1, |c| match self.cut[c] {
@@ -178,7 +177,7 @@ impl<const D: usize> Criteria<'_, D> {
     }
 
     fn is_candidate(&self, c: usize) -> bool {
-        self.cell_material[c] == self.material && !self.cut[c]
+        self.elastic.material[c] == self.material && !self.cut[c]
     }
 
     fn length_squared(&self, c: usize) -> f64 {

@@ -3,6 +3,7 @@
 use super::*;
 use crate::mesh::generate::{Axis, Grid, cuboid, line, rectangle};
 use crate::peridynamics::Micromodulus;
+use crate::tensor::Tensor4;
 
 /// The need of a grid of one material with unit shear modulus.
 fn need<const D: usize>(
@@ -15,8 +16,11 @@ fn need<const D: usize>(
     let count = mesh.cell_count();
     Criteria {
         mesh,
-        tensors: &[Tensor4::isotropic(1.0, 1.0)],
-        cell_material: &vec![0; count],
+        elastic: &ElasticCells {
+            tensors: vec![Tensor4::isotropic(1.0, 1.0)],
+            material: vec![0; count],
+            ..ElasticCells::default()
+        },
         material: 0,
         horizon: &vec![horizon; count],
         gradient_ratio: ratio,

@@ -24,7 +24,7 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::tensor::Vector;
+use crate::tensor::{Tensor4, Vector};
 use crate::{
     model::{Model, clearance},
     parallel,
@@ -94,7 +94,8 @@ pub struct ContactPatch {
 impl<const D: usize> Impact<D> {
     /// Contact of the sites of `model`, which counts `counted` times in the bounds of eigenvalues and row sums: [`RESOLVED`] in motion, 1 in load steps.
     pub fn new(model: &Model<D>, impactors: Vec<RigidImpactor<D>>, counted: f64) -> Self {
-        let modulus = |material: u16| model.elastic.tensors[usize::from(material)].get(0, 0, 0, 0);
+        let modulus =
+            |material: u16| model.elastic.tensors[usize::from(material)].longitudinal_modulus();
         let by_volume = model
             .tributary()
             .masses(model.peridynamic_material(), modulus);
@@ -104,7 +105,7 @@ impl<const D: usize> Impact<D> {
             .elastic
             .tensors
             .iter()
-            .map(|c| c.get(0, 0, 0, 0))
+            .map(Tensor4::longitudinal_modulus)
             .fold(0.0, f64::max);
         let smallest = sizes.iter().copied().fold(f64::INFINITY, f64::min);
         Self {

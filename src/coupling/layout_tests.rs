@@ -38,10 +38,12 @@ fn model(
             tensors: vec![Tensor4::isotropic(1.0, 1.0)],
             material: vec![0; cells],
             of_points: 0,
+            turned: Default::default(),
         },
         peridynamics: Some(Peridynamics {
             law: std::sync::Arc::new(BondBased::new(Micromodulus::InverseDistance, 1.0)),
             horizon: crate::model::HorizonField::Uniform(horizon),
+            horizon_change: crate::model::HorizonChange::default(),
             points,
             weights: BondWeights::Plain,
             volumes: PartialVolume::Full,

@@ -87,6 +87,7 @@ impl<'a, const D: usize> FamilyFit<'a, D> {
                 volumes: &volumes,
                 factors: &vec![1.0; bonds.len()],
                 horizon,
+                bond_horizons: &[],
                 materials: None,
             };
             let (mut pair, mut omega) = (vec![0.0; bonds.len()], vec![0.0; bonds.len()]);

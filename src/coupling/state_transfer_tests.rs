@@ -52,11 +52,13 @@ fn problem(mesh: Mesh<2>, within: [f64; 4], coupling: Box<dyn Coupling<2>>) -> P
             tensors: vec![Tensor4::isotropic(1.0, 1.0)],
             material: vec![0; mesh.cell_count()],
             of_points: 0,
+            turned: Default::default(),
         },
         mesh,
         peridynamics: Some(Peridynamics {
             law: std::sync::Arc::new(BondBased::new(Micromodulus::InverseDistance, 1.0)),
             horizon: crate::model::HorizonField::Uniform(H),
+            horizon_change: crate::model::HorizonChange::default(),
             points: PointSource::Lattice {
                 spacing: 0.25 * H,
                 origin: Vector::<2>::repeat(0.125 * H),

@@ -3,6 +3,7 @@
 //! | file | law |
 //! |---|---|
 //! | `elastic.rs` | isotropic linear elasticity of a bar, in plane stress, plane strain and of a solid |
+//! | `orthotropic.rs` | orthotropic linear elasticity, with axes that may turn from place to place |
 //! | `j2.rs` | von Mises plasticity with isotropic hardening, for small strains |
 //! | `hardening.rs` | its yield stress: linear, Voce, Johnson–Cook |
 //! | `hyperelastic.rs` | St Venant–Kirchhoff and Neo-Hooke, for strains of any size |
@@ -27,6 +28,7 @@ mod hardening;
 mod hyperelastic;
 mod j2;
 mod logarithmic_j2;
+mod orthotropic;
 #[cfg(test)]
 mod path_tests;
 mod prony;
@@ -45,6 +47,7 @@ pub use hardening::{Hardening, JohnsonCook};
 pub use hyperelastic::{NeoHooke, StVenantKirchhoff};
 pub use j2::J2;
 pub use logarithmic_j2::LogarithmicJ2;
+pub use orthotropic::{Axes, EngineeringConstants, Orthotropic, OrthotropicError, PAIRS};
 pub use prony::{Arm, Carried, PronySeries, PronyStep};
 pub use reduction::Reduced;
 pub use scalar_damage::{

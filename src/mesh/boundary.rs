@@ -179,30 +179,45 @@ impl<const D: usize> Mesh<D> {
         first: &C,
         second: &C,
     ) -> Vec<InterfaceFacet> {
+        let mut found = self.facets_where(
+            |c| class[c] == *first || class[c] == *second,
+            |a, b| class[a] != class[b],
+        );
+        for facet in &mut found {
+            if class[facet.first.cell as usize] != *first {
+                std::mem::swap(&mut facet.first, &mut facet.second);
+            }
+        }
+        found
+    }
+
+    /// The facets between two cells of the mesh that differ.
+    pub fn facets_between(&self, differ: impl Fn(usize, usize) -> bool) -> Vec<InterfaceFacet> {
+        self.facets_where(|_| true, differ)
+    }
+
+    /// The facets between two of some cells that differ; the cell of the higher number comes first.
+    fn facets_where(
+        &self,
+        is_one: impl Fn(usize) -> bool,
+        differ: impl Fn(usize, usize) -> bool,
+    ) -> Vec<InterfaceFacet> {
         let mut waiting = Waiting::new(self.nodes.len());
         let mut facets = Vec::new();
         let mut found = Vec::new();
-        for c in 0..self.cell_count() {
-            if class[c] != *first && class[c] != *second {
-                continue;
-            }
+        for c in (0..self.cell_count()).filter(|&c| is_one(c)) {
             for (facet, key) in self.keys_of_cell(c as u32) {
                 let Some(other) = waiting.meet(key) else {
                     facets.push(facet);
                     continue;
                 };
                 let other: (u32, u8) = facets[other];
-                if class[other.0 as usize] == class[c] {
-                    continue;
+                if differ(c, other.0 as usize) {
+                    found.push(InterfaceFacet {
+                        first: self.facet(facet),
+                        second: self.facet(other),
+                    });
                 }
-                let (one, two) = match class[c] == *first {
-                    true => (facet, other),
-                    false => (other, facet),
-                };
-                found.push(InterfaceFacet {
-                    first: self.facet(one),
-                    second: self.facet(two),
-                });
             }
         }
         found

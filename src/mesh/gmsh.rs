@@ -7,15 +7,19 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::MeshError;
 use super::gmsh_kinds::{reorder, shape};
-use crate::mesh::raw::{Encoding, RawMesh, RawNode, Source};
+use super::{MeshError, Order};
+use crate::mesh::raw::{Encoding, RawMesh, RawNode, RawShape, Source};
 
 /// Remedy for a wrong word in a text file.
 const REWRITE: &str = "correct it or write the file again with Gmsh";
 
-/// Parses a file.
-pub(super) fn parse<'a>(path: &Path, bytes: &'a [u8]) -> Result<(RawMesh, Source<'a>), MeshError> {
+/// Parses a file whose cells are to have an order.
+pub(super) fn parse<'a>(
+    path: &Path,
+    bytes: &'a [u8],
+    order: Order,
+) -> Result<(RawMesh, Source<'a>), MeshError> {
     let mut reader = Reader {
         source: Source {
             path: path.into(),
@@ -24,6 +28,7 @@ pub(super) fn parse<'a>(path: &Path, bytes: &'a [u8]) -> Result<(RawMesh, Source
             pieces: &[],
         },
         at: 0,
+        order,
         section: "$MeshFormat".into(),
         version: Version::Four,
         swapped: false,
@@ -31,6 +36,7 @@ pub(super) fn parse<'a>(path: &Path, bytes: &'a [u8]) -> Result<(RawMesh, Source
         names: HashMap::new(),
         entities: HashMap::new(),
         lists: HashMap::new(),
+        partitions: Vec::new(),
         raw: RawMesh::default(),
     };
     reader.file()?;
@@ -46,6 +52,8 @@ enum Version {
 struct Reader<'a> {
     source: Source<'a>,
     at: usize,
+    /// Order that cells are to have.
+    order: Order,
     section: String,
     version: Version,
     /// True if binary numbers have the other byte order than this machine.
@@ -58,6 +66,8 @@ struct Reader<'a> {
     entities: HashMap<(usize, i64), Vec<i64>>,
     /// Lists of groups that already have a number in `raw.groups`.
     lists: HashMap<(usize, Vec<i64>), u32>,
+    /// First partition of each element that belongs to any, and the byte where it stands; of version 2.
+    partitions: Vec<(i64, usize)>,
     raw: RawMesh,
 }
 
@@ -75,6 +85,11 @@ impl<'a> Reader<'a> {
                 return Err(self.syntax_at(start, line, "a section such as $Nodes"));
             };
             self.section = format!("${name}");
+            if name == "Comments" {
+                self.skip_section(&name)?;
+                self.end_of_section(&name)?;
+                continue;
+            }
             if seen.is_empty() && name != "MeshFormat" {
                 return Err(self.syntax_at(start, &format!("${name}"), "$MeshFormat"));
             }
@@ -292,12 +307,11 @@ impl<'a> Reader<'a> {
             for _ in 0..count {
                 let at = self.next_at();
                 let tag = self.size("an element tag")? as u64;
-                let shape = shape(kind).map_err(|e| self.element_error(kind_at, tag, kind, e))?;
-                nodes.clear();
-                for _ in 0..shape.node_count() {
-                    nodes.push(self.size("a node of an element")? as u64);
-                }
-                reorder(shape, &mut nodes);
+                let known = shape(kind, self.order);
+                let known = known.map_err(|e| self.element_error(kind_at, tag, kind, e))?;
+                let shape = self.nodes_of(known, &mut nodes, |own, what| {
+                    own.size(what).map(|n| n as u64)
+                })?;
                 self.raw.push((tag, group, at), shape, &nodes);
             }
         }
@@ -349,12 +363,16 @@ impl<'a> Reader<'a> {
                     at = self.at;
                     tag = self.integer("an element number")?;
                 }
-                let shape = shape(kind).map_err(|e| self.element_error(at, tag as u64, kind, e))?;
+                let known = shape(kind, self.order);
+                let known = known.map_err(|e| self.element_error(at, tag as u64, kind, e))?;
                 let mut physical = 0;
                 for i in 0..tag_count {
                     let tag = self.integer("a tag of an element")?;
-                    if i == 0 {
-                        physical = tag.abs();
+                    match i {
+                        0 => physical = tag.abs(),
+                        // the entity, how many partitions it belongs to, and the first of these
+                        3 => self.partitions.push((tag, at)),
+                        _ => {}
                     }
                 }
                 let groups = if physical == 0 {
@@ -362,16 +380,47 @@ impl<'a> Reader<'a> {
                 } else {
                     vec![physical]
                 };
-                let group = self.group_list(shape.dimension(), groups);
-                nodes.clear();
-                for _ in 0..shape.node_count() {
-                    nodes.push(self.integer("a node of an element")? as u64);
-                }
-                reorder(shape, &mut nodes);
+                let group = self.group_list(known.0.dimension(), groups);
+                let shape = self.nodes_of(known, &mut nodes, |own, what| {
+                    own.integer(what).map(|n| n as u64)
+                })?;
                 self.raw.push((tag as u64, group, at), shape, &nodes);
             }
         }
-        Ok(())
+        self.refuse_part()
+    }
+
+    /// Refuses one partition of a mesh, as Gmsh writes each to a file of its own.
+    fn refuse_part(&self) -> Result<(), MeshError> {
+        let Some(&(first, at)) = self.partitions.first() else {
+            return Ok(());
+        };
+        if self.partitions.iter().any(|(other, _)| *other != first) {
+            return Ok(());
+        }
+        Err(self.unsupported(
+            at,
+            &format!("the partition {first} alone of a partitioned mesh"),
+            "write all of them to one file (in Gmsh: Mesh.PartitionSplitMeshFiles = 0), or the mesh without partitions",
+        ))
+    }
+
+    /// Reads the nodes of an element, one after another by `next`, in our order; returns its shape.
+    fn nodes_of(
+        &mut self,
+        (shape, others): (RawShape, usize),
+        nodes: &mut Vec<u64>,
+        next: impl Fn(&mut Self, &str) -> Result<u64, MeshError>,
+    ) -> Result<RawShape, MeshError> {
+        nodes.clear();
+        for _ in 0..shape.node_count() {
+            nodes.push(next(self, "a node of an element")?);
+        }
+        for _ in 0..others {
+            next(self, "a node of an element")?;
+        }
+        reorder(shape, nodes);
+        Ok(shape)
     }
 
     /// The number of a list of physical groups, whose names are looked up once.
@@ -438,99 +487,6 @@ impl<'a> Reader<'a> {
         ))
     }
 
-    fn point(&mut self) -> Result<[f64; 3], MeshError> {
-        let mut x = [0.0; 3];
-        for x in &mut x {
-            *x = self.double("a coordinate of a node")?;
-        }
-        Ok(x)
-    }
-
-    /// An `int` of the format.
-    fn integer(&mut self, wanted: &str) -> Result<i64, MeshError> {
-        if self.source.encoding == Encoding::Text {
-            return self.number(wanted);
-        }
-        let n = i32::from_ne_bytes(self.bytes(wanted)?);
-        Ok(i64::from(if self.swapped { n.swap_bytes() } else { n }))
-    }
-
-    /// A `size_t` of the format.
-    fn size(&mut self, wanted: &str) -> Result<usize, MeshError> {
-        if self.source.encoding == Encoding::Text {
-            return self.number(wanted);
-        }
-        if self.size_bytes == 4 {
-            let n = u32::from_ne_bytes(self.bytes(wanted)?);
-            return Ok(if self.swapped { n.swap_bytes() } else { n } as usize);
-        }
-        let n = u64::from_ne_bytes(self.bytes(wanted)?);
-        Ok(if self.swapped { n.swap_bytes() } else { n } as usize)
-    }
-
-    fn double(&mut self, wanted: &str) -> Result<f64, MeshError> {
-        if self.source.encoding == Encoding::Text {
-            return self.number(wanted);
-        }
-        let n = u64::from_ne_bytes(self.bytes(wanted)?);
-        Ok(f64::from_bits(if self.swapped {
-            n.swap_bytes()
-        } else {
-            n
-        }))
-    }
-
-    fn bytes<const N: usize>(&mut self, wanted: &str) -> Result<[u8; N], MeshError> {
-        match self.source.bytes[self.at..].first_chunk::<N>() {
-            Some(chunk) => {
-                self.at += N;
-                Ok(*chunk)
-            }
-            None => Err(self.truncated(wanted)),
-        }
-    }
-
-    /// The next word of a text file as a number.
-    fn number<T: std::str::FromStr>(&mut self, wanted: &str) -> Result<T, MeshError> {
-        let start = self.next_at();
-        let rest = &self.source.bytes[start..];
-        let length = rest
-            .iter()
-            .position(u8::is_ascii_whitespace)
-            .unwrap_or(rest.len());
-        if length == 0 {
-            self.at = start;
-            return Err(self.truncated(wanted));
-        }
-        let word = String::from_utf8_lossy(&rest[..length]);
-        match word.parse() {
-            Ok(value) => {
-                self.at = start + length;
-                Ok(value)
-            }
-            Err(_) => Err(self.syntax_at(start, &word, wanted)),
-        }
-    }
-
-    /// Position of the next entry: in text after blanks and line ends.
-    fn next_at(&self) -> usize {
-        if self.source.encoding == Encoding::Binary {
-            return self.at;
-        }
-        self.source.next(self.at)
-    }
-
-    fn skip_space(&mut self) {
-        self.at = self.source.next(self.at);
-    }
-
-    /// The rest of the line, trimmed; what is not UTF-8 reads as nothing.
-    fn line(&mut self) -> &'a str {
-        let (text, next) = self.source.line(self.at);
-        self.at = next;
-        text
-    }
-
     fn truncated(&self, wanted: &str) -> MeshError {
         self.source.truncated(self.at, &self.section, wanted)
     }
@@ -565,6 +521,9 @@ impl<'a> Reader<'a> {
         }
     }
 }
+
+#[path = "gmsh_words.rs"]
+mod words;
 
 #[cfg(test)]
 #[path = "gmsh_tests.rs"]

@@ -291,7 +291,7 @@ fn wrong_files_name_place_value_and_remedy() {
         (
             "3 2 2 6",
             "3 14 2 6",
-            ["line 19", "(second-order pyramid)", "ElementOrder"],
+            ["line 19", "(second-order pyramid)", "mesh.file.order"],
         ),
         (
             "3 2 2 6",

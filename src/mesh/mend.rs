@@ -78,7 +78,7 @@ fn merge(raw: &mut RawMesh, distance: f64) {
         nodes.for_each(|tag| *tag = *tags.get(tag).unwrap_or(tag));
     }
     raw.notes.push(format!(
-        "{} of {} nodes were merged with others within {distance} (mesh.file.merge)",
+        "{} of {} nodes were merged with others within {distance:e} (mesh.file.merge)",
         tags.len(),
         raw.nodes.len()
     ));
@@ -204,7 +204,7 @@ fn split(raw: &mut RawMesh, source: &Source) -> Result<(), MeshError> {
 }
 
 /// Turns cells whose nodes run the wrong way round, and notes how many; `tag` is the number that the file gives to a cell.
-pub(super) fn turn<const D: usize>(mesh: &mut Mesh<D>, tag: impl Fn(usize) -> u64) {
+pub(super) fn turn<const D: usize>(mesh: &mut Mesh<D>, tag: impl Fn(usize) -> String) {
     let mut turned = Vec::new();
     for c in 0..mesh.cell_count() {
         if mesh.cell_volume(c) >= 0.0 {
@@ -375,7 +375,7 @@ mod tests {
             let own: Vec<u32> = (0..nodes.len() as u32).collect();
             let wrong: Vec<u32> = shape.reversed().iter().map(|&k| own[k]).collect();
             mesh.push_cell(shape, &wrong);
-            turn(&mut mesh, |_| 17);
+            turn(&mut mesh, |_| "17".to_owned());
             assert!(quality::check(&mesh).is_ok(), "{shape:?}");
             assert!(mesh.notes[0].contains("element 17"), "{:?}", mesh.notes);
             // each node in the middle of an edge still lies between its ends

@@ -8,7 +8,7 @@
 //! | `raw.rs` | content of a file before it is a mesh |
 //! | `mend.rs` | nodes merged, cells split and turned |
 //! | `parts.rs` | a mesh in memory, as another program hands it over |
-//! | `gmsh.rs`, `gmsh_kinds.rs` | Gmsh MSH 4.1 and 2.2, ASCII and binary |
+//! | `gmsh.rs`, `gmsh_kinds.rs`, `gmsh_words.rs` | Gmsh MSH 4.1 and 2.2, ASCII and binary |
 //! | `inp/` | decks of Abaqus and CalculiX: nodes, elements, sets, surfaces, instances |
 //! | `vtk.rs`, `vtk_grid.rs` | VTK files: cells, and groups of them by integers |
 //! | `vtu.rs`, `vtk_legacy.rs`, `vtk_legacy/` | their two formats, XML and `.vtk` |
@@ -31,7 +31,7 @@ use std::collections::BTreeMap;
 
 mod bodies;
 pub mod boundary;
-mod boxes;
+pub(crate) mod boxes;
 mod cell_shape;
 mod conformity;
 mod dilate_erode;

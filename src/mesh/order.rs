@@ -15,6 +15,8 @@ pub enum Order {
     Kept,
     /// Linear: nodes in the middle of edges are left out.
     Linear,
+    /// Second order: linear cells get nodes in the middle of their edges, which stay straight.
+    Second,
 }
 
 /// A node in the middle of an edge that a cell of first order has too: it follows the ends of the edge, or the cells would part.

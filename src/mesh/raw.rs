@@ -159,6 +159,8 @@ pub(super) struct RawMesh {
     pub left_out: Vec<String>,
     /// Notes on what the reader left out, a sentence each.
     pub notes: Vec<String>,
+    /// Instances of a deck by the number that their tags exceed those of the deck by, ascending; none where tags are the numbers of the file.
+    pub instances: Vec<(u64, String)>,
 }
 
 /// A cell of a shape that no mesh has.
@@ -225,6 +227,7 @@ impl Default for RawMesh {
             others: Vec::new(),
             left_out: Vec::new(),
             notes: Vec::new(),
+            instances: Vec::new(),
         }
     }
 }
@@ -276,6 +279,15 @@ impl RawMesh {
         }
     }
 
+    /// A tag as the file has it: of a deck with several instances `INSTANCE.NUMBER`.
+    pub fn number_in_file(&self, tag: u64) -> String {
+        let after = self.instances.partition_point(|(first, _)| *first < tag);
+        match self.instances[..after].last() {
+            Some((first, name)) if !name.is_empty() => format!("{name}.{}", tag - first),
+            _ => tag.to_string(),
+        }
+    }
+
     /// Number of elements, of all shapes.
     pub fn count(&self) -> usize {
         self.elements.len() + self.others.len()
@@ -283,7 +295,7 @@ impl RawMesh {
 
     /// Gives cells the order; linear ones are without the nodes in the middle of edges, which come after the corners.
     pub(super) fn set_order(&mut self, order: Order) {
-        if order == Order::Kept {
+        if order != Order::Linear {
             return;
         }
         for element in &mut self.elements {

@@ -38,7 +38,7 @@ fn made<const D: usize>(
     options: &Options,
 ) -> Result<(Mesh<D>, Vec<u32>), MeshError> {
     let mut mesh = raw.assemble(source)?;
-    mend::turn(&mut mesh, |cell| raw.cell_tag(D, cell));
+    mend::turn(&mut mesh, |cell| raw.number_in_file(raw.cell_tag(D, cell)));
     let is_type = |word: &&String| {
         !raw.left_out
             .iter()
@@ -49,7 +49,8 @@ fn made<const D: usize>(
     Ok((mesh, kept))
 }
 
-/// The numbers that a file gives to some cells and nodes of its mesh, as [`read_with`] counts them, from 0.
+/// The numbers that a file gives to some cells and nodes of its mesh, as [`read_with`] counts them, from 0; of a deck with several instances
+/// `INSTANCE.NUMBER`.
 ///
 /// # Errors
 /// As [`read`].
@@ -57,7 +58,7 @@ pub fn numbers_in_file<const D: usize>(
     path: &Path,
     options: &Options,
     (cells, nodes): (&[u32], &[u32]),
-) -> Result<[Vec<u64>; 2], MeshError> {
+) -> Result<[Vec<String>; 2], MeshError> {
     let text = load(path)?;
     let (mut raw, source) = parse(path, &text, options)?;
     mend::prepare(&mut raw, &source, options)?;
@@ -73,7 +74,8 @@ pub fn numbers_in_file<const D: usize>(
     let nodes = nodes
         .iter()
         .filter_map(|&n| of_nodes.get(n as usize).copied());
-    Ok([cells.collect(), nodes.collect()])
+    let number = |tag| raw.number_in_file(tag);
+    Ok([cells.map(number).collect(), nodes.map(number).collect()])
 }
 
 /// The largest dimension of any element in the file.
@@ -129,7 +131,7 @@ fn parse<'a>(
 ) -> Result<(RawMesh, Source<'a>), MeshError> {
     let bytes = &text.bytes;
     match extension(path).as_str() {
-        "msh" => gmsh::parse(path, bytes),
+        "msh" => gmsh::parse(path, bytes, options.order),
         "inp" => inp::parse(path, (bytes, &text.pieces), &options.ignore),
         "vtk" => vtk::parse(path, bytes, vtk::Flavour::Legacy),
         "vtu" | "vti" | "vts" | "vtr" => vtk::parse(path, bytes, vtk::Flavour::Xml),

@@ -40,10 +40,11 @@ pub(super) fn parse<'a>(
         Flavour::Xml => vtu::parse(path, bytes)?,
     };
     let mut raw = RawMesh::default();
-    let mut first_node = 0;
+    let mut first = (0, 0);
     for grid in &grids {
-        add_piece(&mut raw, grid, first_node, &source)?;
-        first_node = u64::saturating_add(first_node, grid.points);
+        add_piece(&mut raw, grid, first, &source)?;
+        first.0 = u64::saturating_add(first.0, grid.points);
+        first.1 += grid.types.len() as u64;
     }
     Ok((raw, source))
 }
@@ -61,10 +62,11 @@ pub(super) fn points(
     }
 }
 
+/// Adds a piece, whose nodes and cells have numbers from the first on.
 fn add_piece(
     raw: &mut RawMesh,
     grid: &Grid,
-    first_node: u64,
+    (first_node, first): (u64, u64),
     source: &Source,
 ) -> Result<(), MeshError> {
     for (point, &x) in grid.used.iter().zip(&grid.coordinates) {
@@ -74,11 +76,10 @@ fn add_piece(
             at: grid.at,
         });
     }
-    let first = raw.count();
     let mut shapes = Vec::with_capacity(grid.types.len());
     let mut start = 0;
     for (c, (&kind, &end)) in grid.types.iter().zip(&grid.ends).enumerate() {
-        let element = (first + c) as u64;
+        let element = first + c as u64;
         let Some(shape) = shape(kind) else {
             return Err(MeshError::UnsupportedElement {
                 path: source.path.clone(),
@@ -101,11 +102,24 @@ fn add_piece(
         start = end;
         shapes.push(shape);
     }
+    let is_ghost = ghosts(&grid.cell_data, &shapes);
+    let ghosts = is_ghost.iter().filter(|is| **is).count();
+    if ghosts > 0 {
+        raw.notes.push(format!(
+            "{}: {ghosts} of {} cells, which {GHOSTS} marks as hidden or as those of another piece, are left out",
+            source.path.display(),
+            shapes.len()
+        ));
+    }
     let groups = group_numbers(raw, &grid.cell_data, &shapes);
     let mut start = 0;
-    for (((shape, &end), group), &kind) in
-        (shapes.into_iter().zip(&grid.ends).zip(groups)).zip(&grid.types)
-    {
+    let cells = shapes.into_iter().zip(&grid.ends).zip(groups);
+    let cells = cells.zip(&grid.types).zip(is_ghost);
+    for (tag, ((((shape, &end), group), &kind), is_ghost)) in (first..).zip(cells) {
+        if is_ghost {
+            start = end as usize;
+            continue;
+        }
         let mut nodes: Vec<u64> = (grid.nodes[start..end as usize].iter())
             .map(|n| n.saturating_add(first_node))
             .collect();
@@ -116,7 +130,7 @@ fn add_piece(
             _ => &[],
         };
         swapped.iter().for_each(|&k| nodes.swap(k, k + 1));
-        raw.push((raw.count() as u64, group, grid.at), shape, &nodes);
+        raw.push((tag, group, grid.at), shape, &nodes);
         start = end as usize;
     }
     Ok(())
@@ -130,6 +144,19 @@ fn shape(kind: u8) -> Option<RawShape> {
         13 => Some(RawShape::Other(OtherShape::Prism)),
         14 => Some(RawShape::Other(OtherShape::Pyramid)),
         _ => CellShape::of_vtk(kind).map(RawShape::Cell),
+    }
+}
+
+/// VTK's array of marks of cells that are hidden, or belong to another piece of a grid; 0 for all others.
+const GHOSTS: &str = "vtkGhostType";
+
+/// True for each cell that is no part of the grid.
+fn ghosts(data: &[(String, Vec<i64>)], shapes: &[RawShape]) -> Vec<bool> {
+    let is_its =
+        |(name, marks): &&(String, Vec<i64>)| name == GHOSTS && marks.len() == shapes.len();
+    match data.iter().find(is_its) {
+        Some((_, marks)) => marks.iter().map(|mark| *mark != 0).collect(),
+        None => vec![false; shapes.len()],
     }
 }
 
@@ -175,7 +202,7 @@ fn group_numbers(raw: &mut RawMesh, data: &[(String, Vec<i64>)], shapes: &[RawSh
             }
         }
     };
-    for (name, values) in data {
+    for (name, values) in data.iter().filter(|(name, _)| name != GHOSTS) {
         add(name, values);
     }
     let mut known: HashMap<Vec<String>, u32> = HashMap::from([(Vec::new(), 0)]);

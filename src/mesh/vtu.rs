@@ -182,7 +182,8 @@ impl<'a> File<'a> {
             ([b"VTKFile"], b"ImageData") => {
                 let image = Image::of(|name| tag.attribute(name));
                 let wanted = "an image along the axes with a spacing above zero (Origin, Spacing, Direction)";
-                let image = image.ok_or_else(|| self.syntax(at, "another one", wanted))?;
+                let found = "an image that is turned, or has no size";
+                let image = image.ok_or_else(|| self.syntax(at, found, wanted))?;
                 self.image = Some(image);
             }
             (
@@ -392,9 +393,15 @@ impl<'a> File<'a> {
         };
         if let Some(image) = self.image {
             if grid.cell_data.is_empty() {
-                let found = "an image without integers per cell";
-                let wanted = "CellData with an integer array, such as the number of a phase (of values per point: the filter PointDataToCellData)";
-                return Err(self.syntax(piece.at, found, wanted));
+                let reals = piece.cell_data.first();
+                let found = match reals {
+                    Some(array) => {
+                        format!("an image whose array `{}` holds no integers", array.name)
+                    }
+                    None => "an image without integers per cell".to_owned(),
+                };
+                let wanted = "CellData with an array of integers (Int8 to UInt64), such as the number of a phase (of values per point: the filter PointDataToCellData)";
+                return Err(self.syntax(piece.at, &found, wanted));
             }
             return Ok(Geometry::Image(image));
         }

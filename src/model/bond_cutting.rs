@@ -8,8 +8,8 @@ use crate::{
     model::{ModelError, Peridynamics, PointSource, bins::bin_of, point_cloud::PointCloud},
     parallel,
     peridynamics::{
-        BondWeights, Families, Family, LatticeBonds, LinearForceState, PartialVolume, StatePart,
-        TIE_TOLERANCE, collapsed_tensor, isotropic_shell_factors,
+        BondHorizon, BondWeights, Families, Family, LatticeBonds, LinearForceState, PartialVolume,
+        StatePart, TIE_TOLERANCE, collapsed_tensor, isotropic_shell_factors,
         offset_table::OffsetTable,
         partial_volume::lattice_shells,
         plane_energy,
@@ -197,11 +197,17 @@ impl<const D: usize> LatticeFactors<D> {
     }
 
     /// Removes the bonds to cells of which nothing counts.
-    pub fn drop_without_share(&self, cloud: &PointCloud<D>, families: &mut Families) {
+    pub fn drop_without_share(
+        &self,
+        bond_horizon: BondHorizon,
+        cloud: &PointCloud<D>,
+        families: &mut Families,
+    ) {
         if self.has_partial_volumes() {
             let x = &cloud.position;
             families.retain(|i, j| {
-                self.factor(cloud.horizon.of(i), &(x[j as usize] - x[i]))
+                let horizon = bond_horizon.of([i, j as usize], &cloud.horizon);
+                self.factor(horizon, &(x[j as usize] - x[i]))
                     .is_some_and(|factor| factor > 0.0)
             });
         }
@@ -256,6 +262,7 @@ impl<const D: usize> LatticeFactors<D> {
             volumes: &volumes,
             factors: &factors,
             horizon,
+            bond_horizons: &[],
             materials: None,
         };
         let (mut pair, mut omega) = (vec![0.0; bonds.len()], vec![0.0; bonds.len()]);

@@ -21,6 +21,7 @@ use crate::{
         shared_families::SharedFamilies,
     },
     peridynamics::{CauchyBorn, Cloud, Families, PdBody},
+    system::Symmetry,
     tensor::{Tensor4, Vector},
 };
 
@@ -74,6 +75,8 @@ pub(crate) struct ModelPoints<const D: usize> {
     pub(crate) zone: Vec<Zone>,
     /// Points on the border of two materials.
     pub(crate) on_border: usize,
+    /// Points of the cloud that continue a lattice among those of another, ascending: they follow these.
+    pub(crate) continued: Vec<u32>,
     /// Points of the cloud that are feet of families, on the faces of elements.
     pub(crate) feet: Vec<u32>,
     /// Positions of points whose families have too few feet.
@@ -89,6 +92,7 @@ impl<const D: usize> Default for ModelPoints<D> {
             patches: FxHashMap::default(),
             zone: Vec::new(),
             on_border: 0,
+            continued: Vec::new(),
             feet: Vec::new(),
             left_out: Vec::new(),
             volumes: Volumes::default(),
@@ -101,8 +105,8 @@ pub(crate) struct ModelLattices<const D: usize> {
     /// Spacing of the first \[m\]; 0 without points.
     pub(crate) spacing: f64,
     pub(crate) is_lattice: bool,
-    /// Bond factors and horizon of each.
-    pub(crate) factors: Vec<(LatticeFactors<D>, f64)>,
+    /// Bond factors and horizon of each, as the points' [`Horizon::lattice_of`](crate::peridynamics::Horizon::lattice_of) numbers them.
+    pub(crate) factors: Vec<(Arc<LatticeFactors<D>>, f64)>,
     /// The whole family of a lattice with plain weights, whose tensor the elements have.
     pub(crate) plain: Option<WholeFamily<D>>,
     /// Continuation behind the faces at which bonds end.
@@ -179,6 +183,14 @@ impl<const D: usize> Model<D> {
         );
     }
 
+    /// The symmetry of its stiffness, by its coupling and by the rule under which horizons change.
+    pub fn symmetry(&self) -> Symmetry {
+        match self.has_energy {
+            true => Symmetry::Symmetric,
+            false => Symmetry::Unsymmetric,
+        }
+    }
+
     /// The peridynamic body, if there is one.
     pub fn body(&self) -> Option<&PdBody<D>> {
         self.points.body.as_ref()
@@ -190,6 +202,11 @@ impl<const D: usize> Model<D> {
             SiteKind::Point(p) => self.points.body.as_ref().map(|b| (b, p as usize)),
             SiteKind::Node(_) => None,
         }
+    }
+
+    /// Returns true if a point of the cloud continues a lattice among those of another.
+    pub(crate) fn continues_on(&self, point: u32) -> bool {
+        self.points.continued.binary_search(&point).is_ok()
     }
 
     /// The zone of a point of the cloud.
@@ -222,6 +239,11 @@ impl<const D: usize> Model<D> {
         self.elastic.material[cell]
     }
 
+    /// Returns true if two cells have other materials, or axes that turn from one to the other.
+    pub fn differ(&self, a: usize, b: usize) -> bool {
+        self.elastic.differ(a, b)
+    }
+
     /// The number of the material that peridynamic points have.
     pub fn peridynamic_material(&self) -> u16 {
         self.elastic.of_points
@@ -229,7 +251,7 @@ impl<const D: usize> Model<D> {
 
     /// The local elastic tensor of a cell.
     pub fn tensor_of_cell(&self, cell: usize) -> &Tensor4<D> {
-        &self.elastic.tensors[self.elastic.material[cell] as usize]
+        self.elastic.tensor(cell)
     }
 
     /// The cells around a site that is a node, with the node's number within each.
@@ -239,6 +261,14 @@ impl<const D: usize> Model<D> {
             SiteKind::Point(_) => None,
         };
         node.into_iter().flat_map(|n| self.cells_of_node(n))
+    }
+
+    /// Returns true if the row of a site is the derivative of an energy: that of the model, or of the elements around, none of which another model has a part in.
+    pub(crate) fn has_row_of_energy(&self, site: usize) -> bool {
+        let is_element =
+            |c: usize| self.roles[c] == CellRole::Element && self.zones[c] == Zone::Local;
+        let mut cells = self.cells_of_site(site).peekable();
+        self.has_energy || cells.peek().is_some() && cells.all(|(c, _)| is_element(c))
     }
 
     /// The cells around a node, with the node's number within each.

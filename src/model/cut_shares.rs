@@ -44,7 +44,7 @@ impl<const D: usize> Model<D> {
             for &j in whole.of(i) {
                 let j = j as usize;
                 // bonds run within a lattice
-                if body.is_foot(j) || self.spacing_at(j as u32) != self.spacing_at(i as u32) {
+                if body.is_foot(j) || !self.are_of_one_lattice([i, j]) {
                     continue;
                 }
                 let volume = body.cloud.volume[j];

@@ -68,6 +68,7 @@ impl<const D: usize> Model<D> {
                 .map(|c| p.reach(p.horizon.at(&mesh.centroid(c))))
                 .fold(0.0, f64::max)
         });
+        let is_spliced = peridynamics.as_ref().is_some_and(Peridynamics::is_spliced);
         let roles = coupling.roles(&mesh, &zones, largest);
         let mesh = seam_order::linear_at_seam(mesh, &roles)?;
         let mut model = Self {
@@ -83,7 +84,7 @@ impl<const D: usize> Model<D> {
             points: ModelPoints::default(),
             lattices: ModelLattices::default(),
             interface: coupling.interface(),
-            has_energy: coupling.symmetry() == Symmetry::Symmetric,
+            has_energy: coupling.symmetry() == Symmetry::Symmetric && !is_spliced,
             tributary: Tributary::default(),
             row_scale: None,
             cauchy_born: CauchyBornElements {
@@ -93,7 +94,9 @@ impl<const D: usize> Model<D> {
             operator_cache: OnceLock::new(),
             spread: SpreadFamilies::default(),
         };
-        let has_points = model.roles.contains(&CellRole::Points);
+        model.refuse_splice_in_transition(is_spliced)?;
+        // elements with a partial stress have points around them that are no sites
+        let has_points = model.roles.iter().any(|role| *role != CellRole::Element);
         if has_points && model.peridynamics.is_none() {
             return Err(ModelError::Unsupported {
                 what: "a peridynamic zone without a peridynamic material",
@@ -119,7 +122,7 @@ impl<const D: usize> Model<D> {
     /// The peridynamic points of each lattice; none without peridynamic cells.
     fn place_clouds(&self, coupling: &dyn ZoneLayout<D>) -> Result<Vec<PointCloud<D>>, ModelError> {
         match &self.peridynamics {
-            Some(p) if self.roles.contains(&CellRole::Points) => {
+            Some(p) if self.roles.iter().any(|role| *role != CellRole::Element) => {
                 let beyond = match self.interface.faces {
                     true => Beyond::Continued,
                     false => Beyond::Empty,
@@ -131,7 +134,12 @@ impl<const D: usize> Model<D> {
                     false => reach(coupling, p),
                 };
                 let (mesh, zones) = (&self.mesh, &self.zones);
-                point_generation::place(mesh, zones, &self.roles, p, reach, beyond)
+                let mut clouds =
+                    point_generation::place(mesh, zones, &self.roles, p, reach, beyond)?;
+                match clouds.len() {
+                    1 => p.horizon_change.clouds(clouds.remove(0)),
+                    _ => Ok(clouds),
+                }
             }
             _ => Ok(Vec::new()),
         }
@@ -203,15 +211,16 @@ impl<const D: usize> Model<D> {
             factors,
             wide,
             is_constant,
+            interaction,
             of_point,
             horizons,
             shared,
             held,
         } = merged;
-        self.spread.held = held;
-        self.lattices.spacing = cloud.spacing;
+        (self.spread.held, self.lattices.spacing) = (held, cloud.spacing);
         self.lattices.is_lattice = factors[0].is_lattice();
         self.points.volumes = cloud.volumes;
+        self.points.continued = cloud.continued();
         let point_site = self.place_point_sites(&cloud);
         progress.stage("seam", None);
         let transfer = self.express_places(p, &cloud, wide, &point_site, node_site, coupling)?;
@@ -220,35 +229,38 @@ impl<const D: usize> Model<D> {
         let materials = self.materials_of(p.law.as_ref(), &cloud);
         self.points.on_border = materials.on_border;
         let horizon = cloud.horizon.clone();
-        let shells = |i: usize, xi: &Vector<D>| {
-            let of_lattice = &factors[horizon.lattice_of(i)];
-            of_lattice.factor(horizon.of(i), xi).unwrap_or(1.0)
+        let (of_bonds, lattice_of) = (p.horizon_change.of_bonds(), of_point.clone());
+        let shells = |ends: [usize; 2], xi: &Vector<D>| {
+            let lattice = usize::from(lattice_of[ends[0]]);
+            let factor = factors[lattice].factor(of_bonds.of(ends, &horizon), xi);
+            factor.unwrap_or(1.0) * interaction.as_ref().map_or(1.0, |i| i.of(ends, &horizon))
         };
         let is_regular = is_constant && p.weights != BondWeights::Fitted;
-        let weighting = weighting(p, &factors[0], &shells);
-        let ends = match is_regular && feet.is_none() {
-            true => Ends::Alike,
-            false => Ends::Differ,
-        };
+        let weighting = weighting(p, &factors[0], interaction.is_some(), &shells);
+        let is_alike = is_regular && feet.is_none();
+        let ends = if is_alike { Ends::Alike } else { Ends::Differ };
         if p.weights == BondWeights::Plain {
             self.carry_plain_stiffness(p, &factors[0], horizons[0], self.elastic.of_points)?;
         }
         if let Some(families) = passing {
             let whole = multi_lattice::whole_families(p, &factors, &horizons, is_regular)?;
-            self.lattices.passing = Some(ContinuedLattice {
+            let passing = ContinuedLattice {
                 families,
                 whole,
                 of_point,
-            });
+            };
+            self.lattices.passing = Some(passing);
         }
         self.points.zone = cloud.zone;
         let cloud = Cloud {
             position: cloud.position,
             volume: cloud.volume,
-            horizon: cloud.horizon,
+            horizon: cloud.horizon.grouped(),
             transfer,
             material: materials.of_point,
+            bond_horizon: of_bonds,
         };
+        self.lattices.factors = multi_lattice::by_horizon(&factors, &cloud.horizon, horizons);
         let body = PdBody::new(cloud, families, p.law.linearised(), &weighting, ends)
             .map_err(|e| ModelError::family("the point", e));
         let mut body = self.held_body(shared.zip(ranks), &point_site, body)?;
@@ -256,7 +268,6 @@ impl<const D: usize> Model<D> {
             self.end_families(p, feet, &mut body)?;
         }
         self.points.body = Some(body);
-        self.lattices.factors = factors.into_iter().zip(horizons).collect();
         Ok(())
     }
 
@@ -296,17 +307,19 @@ impl<const D: usize> Model<D> {
         };
         self.node_transfer =
             interface_interpolation::fit_nodes(&sites, coupling.interface(), cloud)?;
-        let (transfer, _) = self.transfer_of(&sites, cloud, |i| point_site[i]);
+        let law = p.law.as_ref();
+        let among = interface_interpolation::fit_continued(&sites, cloud)?;
+        let (transfer, _) = self.transfer_of(law, &sites, cloud, &among, |i| point_site[i]);
         if let Some((wide, renumbered)) = wide {
             let site = |i: usize| point_site[renumbered[i] as usize];
-            let (transfer, patches) = self.transfer_of(&sites, &wide, site);
+            let (transfer, patches) = self.transfer_of(law, &sites, &wide, &[], site);
             self.points.patches = patches;
             self.points.surroundings = Some(Cloud {
                 position: wide.position,
                 volume: wide.volume,
                 horizon: wide.horizon,
                 transfer,
-                material: Vec::new(),
+                ..Cloud::default()
             });
         }
         Ok(transfer)

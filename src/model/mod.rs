@@ -8,6 +8,7 @@
 //! | `layout.rs`, `sites.rs` | its layout | |
 //! | `point_generation.rs`, `point_cloud.rs`, `point_materials.rs` | positions and volumes of points, which of them are needed, and their materials | |
 //! | `multi_lattice.rs`, `completed_lattice.rs`, `continued_lattice.rs`, `lattice_axes.rs`, `lattice_box.rs` | one lattice of points, or several that elements keep apart; its axes; its points in a box | |
+//! | `horizon_change.rs`, `horizon_regions.rs` | rules for bonds between points of different horizons | [SAND2015-7998] sections 2.2, 2.5; \[Jenabidehkordi2019\] |
 //! | `bond_cutting.rs` | bonds that voids, cracks and surfaces cut; weights of a lattice | |
 //! | `interface_interpolation.rs`, `least_squares_gradient.rs` | nodes that follow points | [SAND2015-7998] section 7.3 |
 //! | `recovery.rs`, `recovery_patch.rs` | second derivatives at places in elements | \[ZienkiewiczZhu1992\] |
@@ -30,6 +31,7 @@ pub(crate) mod bins;
 pub(crate) mod bond_cutting;
 pub(crate) mod clearance;
 pub(crate) mod completed_lattice;
+mod continued_field;
 pub(crate) mod continued_lattice;
 pub(crate) mod coupled_model;
 pub(crate) mod crack_layers;
@@ -38,6 +40,8 @@ mod distribution;
 pub(crate) mod family_ends;
 pub mod field_evaluation;
 pub(crate) mod held_families;
+pub(crate) mod horizon_change;
+pub(crate) mod horizon_regions;
 pub(crate) mod interface_interpolation;
 pub(crate) mod lattice_axes;
 pub(crate) mod lattice_box;
@@ -66,6 +70,7 @@ mod zones;
 pub use bins::{Bins, bin_of};
 pub use coupled_model::Model;
 pub use field_evaluation::{Carrier, Sampler};
+pub use horizon_change::HorizonChange;
 pub use least_squares_gradient::FitDegree;
 pub use problem::{
     ElasticCells, HorizonField, Lattice, ModelError, Peridynamics, PointSource, ScalarField,

@@ -1,5 +1,7 @@
 //! The lattices of a model: one, or several that elements keep apart, each with its own spacing and horizon.
 
+use std::sync::Arc;
+
 use crate::{
     mesh::boundary::BoundaryFacet,
     model::{
@@ -8,7 +10,8 @@ use crate::{
         bond_cutting::{self, LatticeFactors, WholeFamily},
         completed_lattice::CompletedLattice,
         held_families::HeldFamilies,
-        point_cloud::PointCloud,
+        horizon_regions::InteractionFactors,
+        point_cloud::{PointCarrier, PointCloud},
         shared_families::SharedFamilies,
     },
     peridynamics::{
@@ -27,10 +30,12 @@ pub(crate) struct MergedLattices<const D: usize> {
     /// Families of the points in elements.
     pub passing: Option<Families>,
     /// Of each lattice.
-    pub factors: Vec<LatticeFactors<D>>,
+    pub factors: Vec<Arc<LatticeFactors<D>>>,
     /// Of the first lattice, see [`CompletedLattice::wide`].
     pub wide: Option<(PointCloud<D>, Vec<u32>)>,
     pub is_constant: bool,
+    /// Of the first lattice, see [`CompletedLattice::interaction`].
+    pub interaction: Option<InteractionFactors>,
     /// The lattice of each point.
     pub of_point: Vec<u16>,
     /// Of each lattice.
@@ -52,10 +57,11 @@ impl<const D: usize> MergedLattices<D> {
             factors: first,
             wide,
             is_constant,
+            interaction,
             shared,
             held,
         } = grown.next()?;
-        let mut factors = vec![first];
+        let mut factors = vec![Arc::new(first)];
         let mut of_point = vec![0u16; cloud.position.len()];
         // a field has one lattice
         let mut horizons = vec![cloud.horizon.largest()];
@@ -67,7 +73,7 @@ impl<const D: usize> MergedLattices<D> {
             of_point.extend(vec![factors.len() as u16; next.cloud.position.len()]);
             horizons.push(next.cloud.horizon.largest());
             cloud.append(next.cloud);
-            factors.push(next.factors);
+            factors.push(Arc::new(next.factors));
         }
         if factors.len() > 1 {
             cloud.horizon = Horizon::PerLattice {
@@ -82,6 +88,7 @@ impl<const D: usize> MergedLattices<D> {
             factors,
             wide,
             is_constant,
+            interaction,
             of_point,
             horizons,
             shared,
@@ -90,8 +97,22 @@ impl<const D: usize> MergedLattices<D> {
     }
 }
 
-/// Refuses horizons below the spacing, and a lattice without points of its own.
-fn check_cloud<const D: usize>(cloud: &PointCloud<D>) -> Result<(), ModelError> {
+/// The factors of each horizon, as points number these: of several lattices their own, of a field those of its one lattice.
+pub(crate) fn by_horizon<const D: usize>(
+    factors: &[Arc<LatticeFactors<D>>],
+    horizon: &Horizon,
+    of_lattices: Vec<f64>,
+) -> Vec<(Arc<LatticeFactors<D>>, f64)> {
+    match (horizon, factors) {
+        (Horizon::PerLattice { horizons, .. }, [all]) => {
+            horizons.iter().map(|h| (Arc::clone(all), *h)).collect()
+        }
+        _ => factors.iter().cloned().zip(of_lattices).collect(),
+    }
+}
+
+/// Refuses horizons below the spacing, and a lattice without points of its own where there is a zone of such.
+fn check_cloud<const D: usize>(cloud: &PointCloud<D>, has_zone: bool) -> Result<(), ModelError> {
     for (i, x) in cloud.position.iter().enumerate() {
         let horizon = cloud.horizon.of(i);
         if !(horizon.is_finite() && horizon >= cloud.spacing * (1.0 - 1e-9)) {
@@ -102,7 +123,7 @@ fn check_cloud<const D: usize>(cloud: &PointCloud<D>) -> Result<(), ModelError> 
             });
         }
     }
-    if cloud.element.iter().all(Option::is_some) {
+    if has_zone && !cloud.carrier.iter().any(PointCarrier::is_own) {
         return Err(ModelError::NoPoints {
             spacing: cloud.spacing,
         });
@@ -143,22 +164,24 @@ impl<const D: usize> Model<D> {
         reach: Reach,
         (held, ranks): Spreading<'_>,
     ) -> Result<CompletedLattice<D>, ModelError> {
-        check_cloud(&cloud)?;
+        check_cloud(&cloud, self.roles.contains(&CellRole::Points))?;
         let is_constant = cloud.horizon.uniform().is_some();
-        let points = 0..cloud.position.len();
-        let reaches: Vec<f64> = points.map(|i| p.reach(cloud.horizon.of(i))).collect();
+        let reaches = p
+            .horizon_change
+            .reaches(p, &cloud.horizon, cloud.position.len());
         let held = held.filter(|_| is_constant);
         let known = self.by_lattice(&cloud, &reaches, (held, ranks));
         let held = held.filter(|_| known.is_some());
         let (mut families, shared) = match known {
             Some(known) => known,
-            None => {
-                let found = Families::search(&cloud.position, &reaches, TIE_TOLERANCE)?;
-                (found, None)
-            }
+            None => (
+                Families::search(&cloud.position, &reaches, TIE_TOLERANCE)?,
+                None,
+            ),
         };
         let factors = LatticeFactors::new(p, &cloud)?;
-        factors.drop_without_share(&cloud, &mut families);
+        let mut interaction = InteractionFactors::of_rule(p, &cloud, &mut families, &factors);
+        factors.drop_without_share(p.horizon_change.of_bonds(), &cloud, &mut families);
         let surface = self.cutting_surface(p, lattice);
         let longest = reaches.iter().copied().fold(0.0, f64::max);
         bond_cutting::cut(
@@ -195,6 +218,8 @@ impl<const D: usize> Model<D> {
             })?;
         }
         cloud.retain(&keep.renumbered);
+        let factors_between = interaction.iter_mut();
+        factors_between.for_each(|between| between.retain(&keep.renumbered));
         // bonds that are cut where elements begin see nothing of what lies beyond
         if self.interface.overlap {
             self.check_materials(p.law.as_ref(), &cloud, |_| true)?;
@@ -206,6 +231,7 @@ impl<const D: usize> Model<D> {
             passing,
             wide,
             is_constant,
+            interaction,
             shared,
             held,
         })
@@ -256,8 +282,8 @@ impl<const D: usize> Model<D> {
                 .iter()
                 .any(|&c| is_own(c))
         };
-        for (i, (x, element)) in cloud.position.iter().zip(&cloud.element).enumerate() {
-            let Some((cell, weights)) = element else {
+        for (i, (x, carrier)) in cloud.position.iter().zip(&cloud.carrier).enumerate() {
+            let PointCarrier::Element(cell, weights) = carrier else {
                 continue;
             };
             // a place on the border of the two materials has its weights on nodes of both
@@ -277,15 +303,27 @@ impl<const D: usize> Model<D> {
         Ok(())
     }
 
+    /// Refuses a splice of horizons where elements carry a partial stress.
+    pub(crate) fn refuse_splice_in_transition(&self, is_spliced: bool) -> Result<(), ModelError> {
+        match is_spliced && self.roles.contains(&CellRole::StressElement) {
+            true => Err(ModelError::Unsupported {
+                what: "a splice of horizons beside elements that carry a partial stress",
+                remedy: "leave peridynamics.horizon-change out there: a partial stress lets the horizon vary as it is",
+            }),
+            false => Ok(()),
+        }
+    }
+
     /// Refuses several lattices where bonds do not end on faces, and where two meet.
     pub(crate) fn check_lattices(&self, p: &Peridynamics<D>) -> Result<(), ModelError> {
         let PointSource::Lattices { lattices, .. } = &p.points else {
             return Ok(());
         };
-        if self.interface != Interface::FACES {
+        let meet = self.interface == Interface::OVERLAP && p.is_spliced();
+        if self.interface != Interface::FACES && !meet {
             return Err(ModelError::Unsupported {
                 what: "several lattices with a coupling that completes families across the seam",
-                remedy: "use coupling.truncated, or one lattice",
+                remedy: "use coupling.truncated, horizon-change = \"splice\" with coupling.splice, or one lattice",
             });
         }
         if p.volumes != PartialVolume::Full {
@@ -293,6 +331,9 @@ impl<const D: usize> Model<D> {
                 what: "partial volumes on several lattices",
                 remedy: "use full volumes, or one lattice",
             });
+        }
+        if meet {
+            return Ok(());
         }
         let of: Vec<Option<usize>> = (0..self.mesh.cell_count())
             .map(|c| self.lattice_in(&p.points, c))
@@ -334,7 +375,7 @@ impl<const D: usize> Model<D> {
         let Some(p) = &self.peridynamics else {
             return Ok(Vec::new());
         };
-        let of = |(factors, horizon): &(LatticeFactors<D>, f64)| {
+        let of = |(factors, horizon): &(Arc<LatticeFactors<D>>, f64)| {
             let family = factors.regular_family(p.law.linearised(), *horizon)?;
             Ok(family.mean_over_axis_planes())
         };
@@ -347,7 +388,7 @@ impl<const D: usize> Model<D> {
         law: &dyn LinearForceState<D>,
         softening: Option<f64>,
     ) -> Result<Vec<(f64, f64)>, ModelError> {
-        let of = |(factors, horizon): &(LatticeFactors<D>, f64)| {
+        let of = |(factors, horizon): &(Arc<LatticeFactors<D>>, f64)| {
             let family = factors.regular_family(law, *horizon)?;
             let at_once = || family.plane_energy();
             let per_square = softening.map_or_else(at_once, |ratio| family.crack_energy(ratio));
@@ -393,8 +434,33 @@ impl<const D: usize> Model<D> {
 
     /// Spacing of the lattice of a point of the cloud \[m\], of several the point's own.
     pub fn spacing_at(&self, point: u32) -> f64 {
-        self.passing()
-            .map_or(self.spacing(), |passing| passing.whole_of(point).spacing)
+        match self.peridynamics.as_ref().map(|p| &p.points) {
+            Some(PointSource::Lattices { lattices, .. }) => {
+                lattices[self.lattice_of_point(point)].spacing
+            }
+            _ => self.spacing(),
+        }
+    }
+
+    /// The lattice of a point of the cloud; the first where there are not several.
+    pub(crate) fn lattice_of_point(&self, point: u32) -> usize {
+        let points = self.peridynamics.as_ref().map(|p| &p.points);
+        match (points, self.body()) {
+            (Some(PointSource::Lattices { .. }), Some(body)) => {
+                body.cloud.horizon.lattice_of(point as usize)
+            }
+            _ => 0,
+        }
+    }
+
+    /// Returns true if families of one lattice hold both points of the cloud.
+    pub(crate) fn are_of_one_lattice(&self, [i, j]: [usize; 2]) -> bool {
+        let (Some(p), Some(body)) = (&self.peridynamics, self.body()) else {
+            return true;
+        };
+        let are_several = p.is_spliced() || matches!(p.points, PointSource::Lattices { .. });
+        let horizon = &body.cloud.horizon;
+        !are_several || horizon.lattice_of(i) == horizon.lattice_of(j)
     }
 
     /// The lattice whose points a cell holds; none of an element.
@@ -418,7 +484,7 @@ impl<const D: usize> Model<D> {
 /// [`ModelError::Unsupported`] where they are not, and where lattices have different tensors.
 pub(crate) fn whole_families<const D: usize>(
     p: &Peridynamics<D>,
-    lattices: &[LatticeFactors<D>],
+    lattices: &[Arc<LatticeFactors<D>>],
     horizons: &[f64],
     is_regular: bool,
 ) -> Result<Vec<WholeFamily<D>>, ModelError> {
@@ -428,7 +494,7 @@ pub(crate) fn whole_families<const D: usize>(
         .map(|(lattice, &horizon)| lattice.whole_family(p.law.linearised(), horizon))
         .collect::<Result<Option<Vec<_>>, _>>()?;
     // the faces that cut bonds follow the axes
-    let is_regular = is_regular && lattices.iter().all(LatticeFactors::is_axis_parallel);
+    let is_regular = is_regular && lattices.iter().all(|l| l.is_axis_parallel());
     let (true, Some(whole)) = (is_regular, whole) else {
         return Err(ModelError::Unsupported {
             what: "a seam of truncated bonds without a regular lattice of one horizon and one weight per shell of bonds",
@@ -457,9 +523,11 @@ fn same_tensor<const D: usize>(a: &Tensor4<D>, b: &Tensor4<D>) -> bool {
 pub(crate) fn weighting<'a, const D: usize>(
     p: &Peridynamics<D>,
     factors: &LatticeFactors<D>,
-    shells: &'a (dyn Fn(usize, &Vector<D>) -> f64 + Sync),
+    mixes_horizons: bool,
+    shells: &'a (dyn Fn([usize; 2], &Vector<D>) -> f64 + Sync),
 ) -> Factors<'a, D> {
     match (p.weights, factors.is_lattice()) {
+        _ if mixes_horizons => Factors::Shells(shells),
         (BondWeights::Isotropic, true) => Factors::Shells(shells),
         (BondWeights::Plain, true) if factors.has_partial_volumes() => Factors::Shells(shells),
         (BondWeights::Fitted, _) => Factors::Fitted,

@@ -17,6 +17,24 @@ pub struct Volumes {
     pub points: f64,
 }
 
+/// PointCarrier of the displacement of a point.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum PointCarrier {
+    /// The point is a site.
+    Own,
+    /// A finite element that interpolates the point (or extrapolates, if it lies in none), with its shape values.
+    Element(u32, Vec<f64>),
+    /// The points of another lattice, among which it continues its own.
+    Lattice,
+}
+
+impl PointCarrier {
+    /// Returns true if the point is a site.
+    pub fn is_own(&self) -> bool {
+        *self == Self::Own
+    }
+}
+
 /// Points before they are sites.
 ///
 /// Shapes: one entry per point in each vector.
@@ -26,8 +44,7 @@ pub(crate) struct PointCloud<const D: usize> {
     pub volume: Vec<f64>,
     pub horizon: Horizon,
     pub zone: Vec<Zone>,
-    /// The finite element that interpolates a point (or extrapolates one that lies in none), with its shape values; none for a point that is a site.
-    pub element: Vec<Option<(u32, Vec<f64>)>>,
+    pub carrier: Vec<PointCarrier>,
     pub spacing: f64,
     /// The axes of the square or cubic lattice that the points are some of, as columns; none for scattered points.
     pub axes: Option<Tensor<D>>,
@@ -48,7 +65,7 @@ impl<const D: usize> PointCloud<D> {
     /// Keeps sites, what is in their families, and with [`Reach::Neighbours`] what is in the families of those.
     pub fn prune(&self, families: &Families, reach: Reach) -> Kept {
         let n = self.position.len();
-        let mut active: Vec<bool> = self.element.iter().map(Option::is_none).collect();
+        let mut active: Vec<bool> = self.carrier.iter().map(PointCarrier::is_own).collect();
         if reach == Reach::Neighbours {
             let site = active.clone();
             for i in 0..n {
@@ -95,8 +112,8 @@ impl<const D: usize> PointCloud<D> {
             |x: &Vector<D>| -> [i64; D] { std::array::from_fn(|i| (x[i] / size).floor() as i64) };
         let mut near = FxHashSet::default();
         let mut centres = FxHashSet::default();
-        for (x, element) in self.position.iter().zip(&self.element) {
-            if element.is_none() {
+        for (x, carrier) in self.position.iter().zip(&self.carrier) {
+            if carrier.is_own() {
                 let centre = bin(x);
                 if !centres.insert(centre) {
                     continue;
@@ -115,7 +132,7 @@ impl<const D: usize> PointCloud<D> {
         let mut renumbered = kept.renumbered;
         let mut passing = vec![false; renumbered.len()];
         for (i, number) in renumbered.iter_mut().enumerate() {
-            passing[i] = self.element[i].is_some() && near.contains(&bin(&self.position[i]));
+            passing[i] = !self.carrier[i].is_own() && near.contains(&bin(&self.position[i]));
             if *number != DROPPED || passing[i] {
                 *number = next;
                 next += 1;
@@ -139,7 +156,7 @@ impl<const D: usize> PointCloud<D> {
         let mut flags = renumbered.iter().map(|&r| r != DROPPED);
         self.horizon.retain(|| flags.next().unwrap_or(false));
         retain_by(&mut self.zone, renumbered);
-        retain_by(&mut self.element, renumbered);
+        retain_by(&mut self.carrier, renumbered);
     }
 }
 
@@ -149,6 +166,12 @@ fn retain_by<T>(values: &mut Vec<T>, renumbered: &[u32]) {
 }
 
 impl<const D: usize> PointCloud<D> {
+    /// The points that continue a lattice among those of another, ascending.
+    pub fn continued(&self) -> Vec<u32> {
+        let continues = |i: &u32| self.carrier[*i as usize] == PointCarrier::Lattice;
+        (0..self.position.len() as u32).filter(continues).collect()
+    }
+
     /// Returns true if the points are some of a lattice along the coordinate axes.
     pub fn is_axis_parallel(&self) -> bool {
         self.axes == Some(Tensor::identity())
@@ -160,7 +183,7 @@ impl<const D: usize> PointCloud<D> {
             volume: Vec::new(),
             horizon: Horizon::default(),
             zone: Vec::new(),
-            element: Vec::new(),
+            carrier: Vec::new(),
             spacing,
             axes: None,
             volumes: Volumes {
@@ -175,22 +198,16 @@ impl<const D: usize> PointCloud<D> {
         self.position.extend(other.position);
         self.volume.extend(other.volume);
         self.zone.extend(other.zone);
-        self.element.extend(other.element);
+        self.carrier.extend(other.carrier);
         self.spacing = self.spacing.max(other.spacing);
         self.volumes.region += other.volumes.region;
         self.volumes.points += other.volumes.points;
     }
 
-    pub fn push(
-        &mut self,
-        x: Vector<D>,
-        volume: f64,
-        zone: Zone,
-        element: Option<(u32, Vec<f64>)>,
-    ) {
+    pub fn push(&mut self, x: Vector<D>, volume: f64, zone: Zone, carrier: PointCarrier) {
         self.position.push(x);
         self.volume.push(volume);
         self.zone.push(zone);
-        self.element.push(element);
+        self.carrier.push(carrier);
     }
 }

@@ -8,7 +8,7 @@ use crate::{
         bins::Bins,
         lattice_axes::lattice_axes,
         lattice_box::{LatticeBox, samples_of},
-        point_cloud::PointCloud,
+        point_cloud::{PointCarrier, PointCloud},
     },
     parallel,
     peridynamics::Horizon,
@@ -37,7 +37,7 @@ pub(crate) fn place<const D: usize>(
     let largest = (0..mesh.cell_count())
         .map(|c| p.reach(p.horizon.at(&mesh.centroid(c))))
         .fold(0.0, f64::max);
-    let placement = |mine: Vec<bool>, horizon: Option<f64>| {
+    let placement = |mine: Vec<bool>, earlier: Vec<bool>, horizon: Option<f64>| {
         let region = parallel::filter_map(mesh.cell_count(), 1, |c| {
             mine[c].then(|| fem::cell_volume(mesh, c))
         })
@@ -56,6 +56,7 @@ pub(crate) fn place<const D: usize>(
             roles,
             p,
             mine,
+            earlier,
             own_horizon: horizon,
             beyond,
             margin,
@@ -65,25 +66,34 @@ pub(crate) fn place<const D: usize>(
         }
     };
     match &p.points {
-        PointSource::Cells => Ok(vec![placement(all, None).at_cells()]),
+        PointSource::Cells => Ok(vec![placement(all, Vec::new(), None).at_cells()]),
         &PointSource::Lattice { spacing, origin } if spacing.is_finite() && spacing > 0.0 => {
-            Ok(vec![placement(all, None).on_lattice(spacing, origin)?])
+            Ok(vec![
+                placement(all, Vec::new(), None).on_lattice(spacing, origin)?,
+            ])
         }
         &PointSource::Lattice { spacing, .. } => Err(ModelError::NoPoints { spacing }),
         PointSource::Lattices { lattices, of_cell } => lattices
             .iter()
             .enumerate()
             .map(|(l, lattice)| {
-                let mine: Vec<bool> = all
-                    .iter()
-                    .zip(of_cell)
-                    .map(|(&points, &of)| points && usize::from(of) == l)
-                    .collect();
+                let cells = |holds: &dyn Fn(usize) -> bool| -> Vec<bool> {
+                    let of_cells = all.iter().zip(of_cell);
+                    of_cells
+                        .map(|(&points, &of)| points && holds(usize::from(of)))
+                        .collect()
+                };
+                let mine = cells(&|of| of == l);
+                // bodies that meet share the points on their faces: the one named later has them
+                let earlier = match beyond {
+                    Beyond::Empty => cells(&|of| of < l),
+                    Beyond::Continued => Vec::new(),
+                };
                 let h = lattice.spacing;
                 if !(h.is_finite() && h > 0.0 && mine.contains(&true)) {
                     return Err(ModelError::NoPoints { spacing: h });
                 }
-                placement(mine, Some(lattice.horizon)).on_lattice(h, lattice.origin)
+                placement(mine, earlier, Some(lattice.horizon)).on_lattice(h, lattice.origin)
             })
             .collect(),
     }
@@ -97,6 +107,8 @@ struct Placement<'a, const D: usize> {
     p: &'a Peridynamics<D>,
     /// Cells whose points are sites.
     mine: Vec<bool>,
+    /// Cells of lattices that are placed before this one, where lattices meet; empty elsewhere.
+    earlier: Vec<bool>,
     /// The horizon of a lattice that has its own.
     own_horizon: Option<f64>,
     beyond: Beyond,
@@ -137,18 +149,21 @@ impl<const D: usize> Placement<'_, D> {
             if (0..D).any(|i| x[i] < self.low[i] || x[i] > self.high[i]) || self.in_void(&x) {
                 continue;
             }
-            let element = (roles[c] != CellRole::Points).then(|| {
-                let n = mesh.cell(c).len();
-                (c as u32, vec![1.0 / n as f64; n])
-            });
+            let carrier = match roles[c] {
+                CellRole::Points => PointCarrier::Own,
+                CellRole::Element | CellRole::StressElement => {
+                    let n = mesh.cell(c).len();
+                    PointCarrier::Element(c as u32, vec![1.0 / n as f64; n])
+                }
+            };
             let volume = fem::cell_volume(mesh, c);
-            if element.is_none() {
+            if carrier.is_own() {
                 cloud.volumes.points += volume;
                 cloud.spacing += volume;
             }
-            cloud.push(x, volume, zones[c], element);
+            cloud.push(x, volume, zones[c], carrier);
         }
-        let sites = cloud.element.iter().filter(|e| e.is_none()).count().max(1);
+        let sites = cloud.carrier.iter().filter(|c| c.is_own()).count().max(1);
         cloud.spacing = (cloud.spacing / sites as f64).powf(1.0 / D as f64);
         cloud.axes = lattice_axes(&cloud.position, &cloud.volume, cloud.spacing);
         cloud.horizon = self.horizons(&cloud.position);
@@ -184,18 +199,18 @@ impl<const D: usize> Placement<'_, D> {
         } else {
             1.0
         };
-        for (x, volume, share, zone, element) in found {
+        for (x, volume, share, zone, carrier) in found {
             let factor = if volume < whole { scale } else { 1.0 };
             cloud.volumes.points += share * factor;
-            cloud.push(x, volume * factor, zone, element);
+            cloud.push(x, volume * factor, zone, carrier);
         }
         cloud.horizon = self.horizons(&cloud.position);
         cloud
     }
 }
 
-/// A point of a lattice: position, volume, how much of that lies in the region, zone, and the element that it follows with its shape values.
-type Found<const D: usize> = (Vector<D>, f64, f64, Zone, Option<(u32, Vec<f64>)>);
+/// A point of a lattice: position, volume, how much of that lies in the region, zone, and the carrier of its displacement.
+type Found<const D: usize> = (Vector<D>, f64, f64, Zone, PointCarrier);
 
 /// Positions that are nearer than this, in sizes of a cell, lie in the cell.
 const TOLERANCE: f64 = 1e-9;
@@ -204,7 +219,10 @@ const TOLERANCE: f64 = 1e-9;
 struct LatticeSampler<'a, const D: usize> {
     place: &'a Placement<'a, D>,
     lattice: LatticeBox<D>,
+    /// Elements, and cells of lattices that are placed later.
     elements: Locator<D>,
+    /// Cells of lattices that are placed before.
+    earlier: Locator<D>,
     nearest: Nearest<'a, D>,
     /// Cells of the region by zones: at a face that zones share, the zone that comes first here has the point.
     by_zone: [(Zone, Locator<D>); 3],
@@ -224,9 +242,11 @@ impl<'a, const D: usize> LatticeSampler<'a, D> {
         let cells = |keep: &dyn Fn(usize) -> bool| {
             Locator::new(mesh, (0..mesh.cell_count()).filter(|&c| keep(c)))
         };
+        let is_earlier = |c: usize| place.earlier.get(c).is_some_and(|is| *is);
         let h = lattice.spacing();
         let mut sampler = Self {
-            elements: cells(&|c| !place.mine[c]),
+            elements: cells(&|c| !place.mine[c] && !is_earlier(c)),
+            earlier: cells(&is_earlier),
             nearest: Nearest::new(mesh, roles, h),
             by_zone: [Zone::Nonlocal, Zone::Transition, Zone::Local]
                 .map(|zone| (zone, cells(&|c| place.mine[c] && zones[c] == zone))),
@@ -314,16 +334,27 @@ impl<'a, const D: usize> LatticeSampler<'a, D> {
             *emptied += whole * inside as f64 / count as f64;
             return None;
         }
-        let located = self.elements.locate(mesh, &x, TOLERANCE);
+        let mut located = self.elements.locate(mesh, &x, TOLERANCE);
         let zone = match &located {
-            Some(l) => Some(zones[l.cell]),
+            Some(_) => None,
             None => self.in_region(&x),
         };
+        if zone.is_none() && located.is_none() {
+            located = self.earlier.locate(mesh, &x, TOLERANCE);
+        }
+        let zone = zone.or(located.as_ref().map(|l| zones[l.cell]));
         let zone = match (zone, self.place.beyond) {
             (Some(zone), _) => zone,
             (None, Beyond::Empty) => return None,
             (None, Beyond::Continued) => {
-                return Some((x, whole, 0.0, Zone::Local, Some(self.nearest.around(&x))));
+                let (cell, shape) = self.nearest.around(&x);
+                return Some((
+                    x,
+                    whole,
+                    0.0,
+                    Zone::Local,
+                    PointCarrier::Element(cell, shape),
+                ));
             }
         };
         let (mut volume, mut share) = (whole, if located.is_none() { whole } else { 0.0 });
@@ -331,11 +362,18 @@ impl<'a, const D: usize> LatticeSampler<'a, D> {
             (volume, share) = self.sampled_volume(&x, emptied);
         }
         (volume > 0.0).then(|| {
-            let element = located.map(|l| match roles[l.cell] {
-                CellRole::Points => self.nearest.around(&x),
-                _ => (l.cell as u32, l.shape[..l.nodes].to_vec()),
-            });
-            (x, volume, share, zone, element)
+            let carrier = match (located, self.place.beyond) {
+                (None, _) => PointCarrier::Own,
+                (Some(l), Beyond::Empty) if roles[l.cell] == CellRole::Points => {
+                    PointCarrier::Lattice
+                }
+                (Some(l), _) if roles[l.cell] == CellRole::Points => {
+                    let (cell, shape) = self.nearest.around(&x);
+                    PointCarrier::Element(cell, shape)
+                }
+                (Some(l), _) => PointCarrier::Element(l.cell as u32, l.shape[..l.nodes].to_vec()),
+            };
+            (x, volume, share, zone, carrier)
         })
     }
 
@@ -351,7 +389,8 @@ impl<'a, const D: usize> LatticeSampler<'a, D> {
                 return;
             }
             here += usize::from(inside);
-            body += usize::from(inside || self.elements.holds(self.place.mesh, &s, TOLERANCE));
+            let mut others = [&self.elements, &self.earlier].into_iter();
+            body += usize::from(inside || others.any(|l| l.holds(self.place.mesh, &s, TOLERANCE)));
         });
         *emptied += whole * gone as f64 / count as f64;
         (

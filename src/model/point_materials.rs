@@ -2,7 +2,11 @@
 
 use crate::{
     fem::Locator,
-    model::{CellRole, Interface, Model, ModelError, bins::Bins, point_cloud::PointCloud},
+    model::{
+        CellRole, Interface, Model, ModelError,
+        bins::Bins,
+        point_cloud::{PointCarrier, PointCloud},
+    },
     parallel,
     peridynamics::{Law, Mixture},
     tensor::Vector,
@@ -57,17 +61,16 @@ impl<const D: usize> Model<D> {
             let mut holders = (locators.iter()).filter(|(_, l)| l.holds(&self.mesh, x, TOLERANCE));
             (holders.next().map(|(m, _)| *m), holders.next().is_some())
         };
-        let found = parallel::map(cloud.position.len(), 1, |i| match &cloud.element[i] {
-            None => holders(&cloud.position[i]),
-            Some(_) if self.interface == Interface::FACES => (None, false),
-            Some((cell, _)) => {
+        let found = parallel::map(cloud.position.len(), 1, |i| match &cloud.carrier[i] {
+            PointCarrier::Own | PointCarrier::Lattice => holders(&cloud.position[i]),
+            PointCarrier::Element(..) if self.interface == Interface::FACES => (None, false),
+            PointCarrier::Element(cell, _) => {
                 let material = self.elastic.material[*cell as usize];
                 let is_known = several.used().contains(&material);
                 (is_known.then_some(material), false)
             }
         });
-        let sites =
-            (0..found.len()).filter(|&i| cloud.element[i].is_none() && found[i].0.is_some());
+        let sites = (0..found.len()).filter(|&i| cloud.carrier[i].is_own() && found[i].0.is_some());
         let sites: Vec<(Vector<D>, u16)> = sites
             .filter_map(|i| Some((cloud.position[i], found[i].0?)))
             .collect();

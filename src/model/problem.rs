@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
+use rustc_hash::FxHashMap;
 use thiserror::Error;
 
 use crate::{
     mesh::{CellShape, Mesh},
-    model::{Zone, ZoneLayout},
+    model::{HorizonChange, Zone, ZoneLayout},
     peridynamics::{Accelerator, BondWeights, BoxCell, Horizon, Law, PartialVolume, PointError},
     shape::{Barrier, Shape},
     tensor::{Tensor4, Vector},
@@ -80,6 +81,8 @@ pub struct Peridynamics<const D: usize> {
     pub law: Arc<dyn Law<D>>,
     /// Horizon δ \[m\].
     pub horizon: HorizonField<D>,
+    /// Rule for bonds between points of different horizons.
+    pub horizon_change: HorizonChange,
     /// Source of the points; a lattice of several has its own horizon instead.
     pub points: PointSource<D>,
     /// Weighting of the bonds.
@@ -101,6 +104,17 @@ impl<const D: usize> Peridynamics<D> {
             BondWeights::Plain | BondWeights::Isotropic => self.law.accelerator(),
             BondWeights::Fitted => None,
         }
+    }
+
+    /// Returns true if points of different horizons each continue the lattice with their own.
+    pub fn is_spliced(&self) -> bool {
+        let varies = match &self.points {
+            PointSource::Lattices { lattices, .. } => lattices.len() > 1,
+            PointSource::Cells | PointSource::Lattice { .. } => {
+                matches!(self.horizon, HorizonField::Field(_))
+            }
+        };
+        varies && self.horizon_change == HorizonChange::Splice
     }
 
     /// Returns the reach of a family of that horizon \[m\]: with partial volumes it exceeds the horizon, since cells count whose points lie beyond it.
@@ -140,7 +154,7 @@ pub struct ZonedBody<const D: usize> {
 }
 
 /// Elastic constants of cells.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct ElasticCells<const D: usize> {
     /// Local elastic tensors \[Pa\], one per material.
     pub tensors: Vec<Tensor4<D>>,
@@ -148,6 +162,41 @@ pub struct ElasticCells<const D: usize> {
     pub material: Vec<u16>,
     /// The material that peridynamic points have, an index into `tensors`.
     pub of_points: u16,
+    /// The tensors of cells whose material has axes that turn from cell to cell, by cell: in the place of their material's \[Pa\].
+    pub turned: FxHashMap<u32, Tensor4<D>>,
+}
+
+impl<const D: usize> ElasticCells<D> {
+    /// The local elastic tensor of a cell \[Pa\].
+    pub fn tensor(&self, cell: usize) -> &Tensor4<D> {
+        let own = match self.turned.is_empty() {
+            true => None,
+            false => self.turned.get(&(cell as u32)),
+        };
+        own.unwrap_or(&self.tensors[usize::from(self.material[cell])])
+    }
+
+    /// Returns true if two cells have other materials, or axes that turn from one to the other.
+    pub fn differ(&self, a: usize, b: usize) -> bool {
+        self.material[a] != self.material[b]
+            || !self.turned.is_empty() && self.tensor(a) != self.tensor(b)
+    }
+
+    /// The same constants, those of some cells multiplied by a factor; tensors that no cell has are not kept apart.
+    pub fn scaled_where(mut self, is_scaled: &[bool], factor: f64) -> Self {
+        let shift = self.tensors.len() as u16;
+        let scaled: Vec<Tensor4<D>> = self.tensors.iter().map(|c| c.scaled(factor)).collect();
+        self.tensors.extend(scaled);
+        for (material, _) in self.material.iter_mut().zip(is_scaled).filter(|m| *m.1) {
+            *material += shift;
+        }
+        for (c, tensor) in &mut self.turned {
+            if is_scaled[*c as usize] {
+                *tensor = tensor.scaled(factor);
+            }
+        }
+        self
+    }
 }
 
 /// Refuses a law whose rows a coupling cannot hold.
@@ -251,6 +300,26 @@ pub enum ModelError {
         horizon: f64,
         /// Spacing of the points \[m\].
         spacing: f64,
+    },
+    /// More horizons than a rule takes.
+    #[error(
+        "the horizon has {count} values at the points, and horizon-change = \"{rule}\" takes at most {most}, as it knows regions of one horizon each; use horizon-change = \"dual\", coupling.partial-stress, or an expression of few values, such as if(x < 1, 0.1, 0.2)"
+    )]
+    TooManyHorizons {
+        /// The rule.
+        rule: &'static str,
+        /// Number of different horizons.
+        count: usize,
+        /// The most that the rule takes.
+        most: usize,
+    },
+    /// A point that continues a lattice among the points of another cannot be fitted to those.
+    #[error("a lattice has to go on at ({}), but the {found} points of other lattices around that no crack or void hides do not determine an affine fit: keep cracks and voids a horizon away from where lattices meet, or give all the same spacing", join(.position))]
+    Continuation {
+        /// Position of the point.
+        position: Vec<f64>,
+        /// Number of points found.
+        found: usize,
     },
     /// A family cannot carry the law.
     #[error("{what} at ({}) has a family of {bonds} bonds that cannot carry the material: {source}", join(.position))]
@@ -387,6 +456,7 @@ impl ModelError {
             | Self::Family { position, .. }
             | Self::OtherMaterial { position }
             | Self::Fit { position, .. }
+            | Self::Continuation { position, .. }
             | Self::CurvedSeam { position, .. }
             | Self::Derivative { position, .. } => Some(position),
             _ => None,

@@ -13,10 +13,16 @@ use crate::{
     assembly::Transfer,
     mesh::Mesh,
     model::{
-        CellRole, Model, SiteKind, bins::Bins, interface_interpolation::Sites,
-        least_squares_gradient, point_cloud::PointCloud, recovery_patch::Patch,
+        CellRole, Model, SiteKind,
+        bins::Bins,
+        continued_field::ContinuedField,
+        interface_interpolation::{SiteWeights, Sites},
+        least_squares_gradient,
+        point_cloud::{PointCarrier, PointCloud},
+        recovery_patch::Patch,
     },
     parallel,
+    peridynamics::Law,
     peridynamics::alike::{FamilyShape, first_alike},
     tensor::Vector,
 };
@@ -25,13 +31,15 @@ use crate::{
 const COINCIDES: f64 = 1e-12;
 
 impl<const D: usize> Model<D> {
-    /// Expresses the points of a cloud through sites, with what interpolation lacks in elements where some lie between the nodes; `site` names that of a point that is one.
+    /// Expresses the points of a cloud through sites, with what interpolation lacks in elements where some lie between the nodes; `site` names that of a point that is one, `among` the rows of those that continue a lattice.
     ///
-    /// If nothing overlaps, a point behind a face is a place only, and interpolation will do; elsewhere forces of points depend on it.
+    /// If nothing overlaps, a point behind a face is a place only, and interpolation will do, or what the zone has there in an element of another material; elsewhere forces of points depend on it.
     pub(crate) fn transfer_of(
         &self,
+        law: &dyn Law<D>,
         sites: &Sites<'_, D>,
         cloud: &PointCloud<D>,
+        among: &[SiteWeights],
         site: impl Fn(usize) -> u32 + Sync,
     ) -> (Transfer, FxHashMap<u32, Patch<D>>) {
         // families of other clouds carry no affine field, and no better ghost would mend that
@@ -45,7 +53,22 @@ impl<const D: usize> Model<D> {
                 &self.elastic.material,
             ),
         };
-        let rows = rows(&self.mesh, cloud, &self.node_transfer, &patches, site);
+        let continued = ContinuedField::new(self, law, sites, cloud);
+        let rows: Vec<_> = parallel::map(cloud.position.len(), 1, |i| match &cloud.carrier[i] {
+            PointCarrier::Own => vec![(site(i), 1.0)],
+            PointCarrier::Lattice => among.get(i).cloned().unwrap_or_default(),
+            PointCarrier::Element(cell, shape) => match continued.row(i) {
+                Some(row) => row
+                    .into_iter()
+                    .map(|(p, w)| (site(p as usize), w))
+                    .collect(),
+                None => {
+                    let x = &cloud.position[i];
+                    row(&self.mesh, &self.node_transfer, &patches, *cell, shape, x)
+                }
+            },
+        });
+        let rows = Transfer::from_rows(self.node_transfer.sites(), rows);
         (rows, patches)
     }
 
@@ -65,23 +88,6 @@ impl<const D: usize> Model<D> {
             x,
         )
     }
-}
-
-/// Rows of all places of a cloud, exact for quadratic fields where their element has a patch.
-///
-/// `site` names the site of a point that is one; `of_node` expresses nodes through sites.
-fn rows<const D: usize>(
-    mesh: &Mesh<D>,
-    cloud: &PointCloud<D>,
-    of_node: &Transfer,
-    patches: &FxHashMap<u32, Patch<D>>,
-    site: impl Fn(usize) -> u32 + Sync,
-) -> Transfer {
-    let rows: Vec<_> = parallel::map(cloud.position.len(), 1, |i| match &cloud.element[i] {
-        None => vec![(site(i), 1.0)],
-        Some((cell, shape)) => row(mesh, of_node, patches, *cell, shape, &cloud.position[i]),
-    });
-    Transfer::from_rows(of_node.sites(), rows)
 }
 
 /// The row of the place `x` in a cell with these shape values.
@@ -142,8 +148,8 @@ fn patches<const D: usize>(
     material: &[u16],
 ) -> FxHashMap<u32, Patch<D>> {
     let mut wanted: Vec<u32> = Vec::new();
-    for (x, element) in cloud.position.iter().zip(&cloud.element) {
-        let Some((cell, shape)) = element else {
+    for (x, carrier) in cloud.position.iter().zip(&cloud.carrier) {
+        let PointCarrier::Element(cell, shape) = carrier else {
             continue;
         };
         let (centre, size) = centre_and_size(at, *cell);

@@ -23,8 +23,8 @@ impl<const D: usize> Model<D> {
     ) -> Option<(Families, SharedFamilies)> {
         let mut sites = self.sites.clone();
         let mut site_of_point = vec![NONE; cloud.position.len()];
-        let points = cloud.element.iter().enumerate();
-        for (p, _) in points.filter(|(_, element)| element.is_none()) {
+        let points = cloud.carrier.iter().enumerate();
+        for (p, _) in points.filter(|(_, carrier)| carrier.is_own()) {
             site_of_point[p] = sites.len() as u32;
             sites.push(Site {
                 position: cloud.position[p],
@@ -39,10 +39,10 @@ impl<const D: usize> Model<D> {
         let mut others = self.beside_elements(&cloud.position, held.depth);
         // those in elements complete families of the seam
         let in_element = cloud
-            .element
+            .carrier
             .iter()
             .enumerate()
-            .filter(|(_, e)| e.is_some());
+            .filter(|(_, carrier)| !carrier.is_own());
         for (p, _) in in_element {
             (own[p], others[p]) = (false, true);
         }

@@ -49,8 +49,8 @@ impl<const D: usize> Model<D> {
     /// Makes sites of the points that follow no element; returns the site of each point.
     pub(crate) fn place_point_sites(&mut self, cloud: &PointCloud<D>) -> Vec<u32> {
         let mut point_site = vec![NONE; cloud.position.len()];
-        for (i, element) in cloud.element.iter().enumerate() {
-            if element.is_none() {
+        for (i, carrier) in cloud.carrier.iter().enumerate() {
+            if carrier.is_own() {
                 point_site[i] = self.sites.len() as u32;
                 self.sites.push(Site {
                     position: cloud.position[i],

@@ -25,7 +25,7 @@ use crate::regular_file;
 const MAGIC: &[u8; 8] = b"bondline";
 
 /// The version of the format; a change of what is saved changes it.
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 
 /// Bytes before the state: letters, version, identity.
 const HEAD: usize = 8 + 4 + 8;

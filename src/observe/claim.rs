@@ -25,19 +25,21 @@ pub struct Files {
     pub files: Vec<String>,
     /// True if there are files `NAME_0000.vtu`, `NAME_0001.vtu`, … too, or `NAME_0000.pvtu`, … with a piece of each process.
     pub series: bool,
+    /// The beginnings of the names of further such series.
+    #[serde(default)]
+    pub others: Vec<String>,
 }
 
 impl Files {
     /// Returns true if a file is one of these.
     pub fn contains(&self, file: &str) -> bool {
-        self.files.iter().any(|own| own == file) || (self.series && self.is_of_series(file))
+        self.files.iter().any(|own| own == file) || self.names().any(|name| is_of(name, file))
     }
 
-    fn is_of_series(&self, file: &str) -> bool {
-        let number = stem(file)
-            .and_then(|stem| stem.strip_prefix(&self.name))
-            .and_then(|rest| rest.strip_prefix('_'));
-        number.is_some_and(|n| n.len() >= 4 && n.bytes().all(|b| b.is_ascii_digit()))
+    /// The names of the series.
+    fn names(&self) -> impl Iterator<Item = &str> {
+        let own = self.series.then_some(&self.name).into_iter();
+        own.chain(&self.others).map(String::as_str)
     }
 
     /// A file in `folder` that these would write over and that a scene of another name has left, and whose it is.
@@ -60,13 +62,8 @@ impl Files {
                 }
             }
             let (name, _) = stem(file)?.rsplit_once('_')?;
-            let series = Self {
-                name: name.to_owned(),
-                series: true,
-                ..Self::default()
-            };
             let collection = folder.join(format!("{name}.pvd"));
-            let is_of_another = series.is_of_series(file) && lists(&collection, file);
+            let is_of_another = is_of(name, file) && lists(&collection, file);
             is_of_another.then(|| (folder.join(file), collection.display().to_string()))
         });
         let alone = || {
@@ -83,12 +80,20 @@ impl Files {
 
     /// A file that both would write.
     fn shared(&self, other: &Self) -> Option<String> {
-        let both_in_series = self.series && other.series && self.name == other.name;
-        let of_series = || both_in_series.then(|| format!("{}_0000.vtu", self.name));
+        let of_both = || self.names().find(|name| other.names().any(|n| n == *name));
+        let of_series = || of_both().map(|name| format!("{name}_0000.vtu"));
         let theirs = other.files.iter().filter(|f| self.contains(f));
         let mine = self.files.iter().filter(|f| other.contains(f));
         theirs.chain(mine).next().cloned().or_else(of_series)
     }
+}
+
+/// Returns true if a file is `NAME_0000.vtu` and the like, or a piece of one.
+fn is_of(name: &str, file: &str) -> bool {
+    let number = stem(file)
+        .and_then(|stem| stem.strip_prefix(name))
+        .and_then(|rest| rest.strip_prefix('_'));
+    number.is_some_and(|n| n.len() >= 4 && n.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// Content of a claim.
@@ -303,6 +308,7 @@ mod tests {
             name: name.to_owned(),
             files: vec![format!("{name}.pvd"), format!("{name}_history.csv")],
             series: true,
+            others: Vec::new(),
         }
     }
 
@@ -346,6 +352,7 @@ mod tests {
             name: "plate_0000".to_owned(),
             files: vec![file.to_owned()],
             series: false,
+            others: Vec::new(),
         };
         let error = Claim::take(folder.path(), "still", &still("plate_0000.vtu")).unwrap_err();
         let said = error.to_string();
@@ -369,6 +376,7 @@ mod tests {
             name: name.to_owned(),
             files: vec![format!("{name}.vtu")],
             series: false,
+            others: Vec::new(),
         };
         let error = Claim::take(folder.path(), "other", &named("st_p1")).unwrap_err();
         assert!(error.to_string().contains("st_p1.vtu"), "{error}");

@@ -236,6 +236,9 @@ pub struct RunSummary {
     /// The largest rotation of a finite element, from 2 degrees on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotation: Option<Rotation>,
+    /// Load steps that this run took before its motion.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stages: Vec<StageSummary>,
     /// Results of a scene in time; none of a static one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionSummary>,
@@ -250,6 +253,44 @@ impl RunSummary {
     /// Only if a path is not Unicode.
     pub fn json(&self) -> Result<String, serde_json::Error> {
         serde_json::to_string_pretty(self)
+    }
+}
+
+/// Summary of load steps before a motion. Units as in [`RunSummary`].
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StageSummary {
+    /// The stage, as the scene names it.
+    pub stage: String,
+    /// Steps, energies and cracks at its end.
+    pub motion: MotionSummary,
+    /// Forces of the loads at its end.
+    pub applied: Vec<ConditionForce>,
+    /// Forces of the displacement conditions at its end.
+    pub reactions: Vec<ConditionForce>,
+    /// Forces in sections at its end.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sections: Vec<SectionForce>,
+}
+
+impl fmt::Display for StageSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (stage, motion) = (&self.stage, &self.motion);
+        writeln!(
+            f,
+            "stage                  {stage}: {} load steps to t = {}, stored energy {}, work {}, {} broken bonds",
+            motion.steps,
+            number(motion.time),
+            number(motion.stored_energy),
+            number(motion.external_work),
+            motion.broken_bonds
+        )?;
+        let applied = self.applied.iter().map(|a| ("applied", a));
+        let reactions = self.reactions.iter().map(|r| ("reaction", r));
+        for (word, of) in applied.chain(reactions) {
+            let (force, name) = (components(&of.force), &of.condition);
+            writeln!(f, "{word:<22} {name}, at the end of {stage}: {force}")?;
+        }
+        Ok(())
     }
 }
 
@@ -330,6 +371,9 @@ impl fmt::Display for RunSummary {
         writeln!(f, "{}", aligned(&grid))?;
         if let Some(bytes) = self.peak_memory_bytes {
             writeln!(f, "peak memory            {}", bytes_text(bytes))?;
+        }
+        for stage in &self.stages {
+            write!(f, "{stage}")?;
         }
         match &self.motion {
             Some(motion) => motion.write(self.dimension, f)?,

@@ -14,8 +14,8 @@ use crate::{
     assembly::{Row, Transfer},
     parallel,
     peridynamics::{
-        Bound, Families, Family, FamilyMaterials, Horizon, LinearForceState, PdError, PointError,
-        Reversed, StatePart, collapsed_tensor, moment_fitted_weights,
+        BondHorizon, Bound, Families, Family, FamilyMaterials, Horizon, LinearForceState, PdError,
+        PointError, Reversed, StatePart, collapsed_tensor, moment_fitted_weights,
     },
     tensor::{Tensor, Tensor4, Vector},
 };
@@ -49,6 +49,8 @@ pub struct Cloud<const D: usize> {
     pub transfer: Transfer,
     /// The number of each point's material; empty if all have one.
     pub material: Vec<u16>,
+    /// Horizon of bonds whose ends have different ones.
+    pub bond_horizon: BondHorizon,
 }
 
 /// Points with families and the coefficients of one law.
@@ -75,6 +77,7 @@ struct Scratch<const D: usize> {
     volumes: Vec<f64>,
     factors: Vec<f64>,
     materials: Vec<u16>,
+    horizons: Vec<f64>,
 }
 
 /// Factors of the bonds of a point's family.
@@ -84,8 +87,8 @@ pub type FamilyFactors<'a> = dyn Fn(usize) -> Result<Vec<f64>, PdError> + Sync +
 pub enum Factors<'a, const D: usize> {
     /// All 1.
     Plain,
-    /// A function of the point and the bond vector.
-    Shells(&'a (dyn Fn(usize, &Vector<D>) -> f64 + Sync)),
+    /// A function of both ends and the bond vector.
+    Shells(&'a (dyn Fn([usize; 2], &Vector<D>) -> f64 + Sync)),
     /// Fitted to the fourth moments, family by family.
     Fitted,
     /// By a function of the point.
@@ -93,10 +96,28 @@ pub enum Factors<'a, const D: usize> {
 }
 
 impl<const D: usize> Scratch<D> {
+    /// The bonds of a point, and what the law is told of them.
+    fn fill(&mut self, i: usize, cloud: &Cloud<D>, family: &[u32]) {
+        for list in [&mut self.volumes, &mut self.horizons] {
+            list.clear();
+        }
+        self.bonds.clear();
+        self.materials.clear();
+        for j in family.iter().map(|&j| j as usize) {
+            self.bonds.push(cloud.position[j] - cloud.position[i]);
+            self.volumes.push(cloud.volume[j]);
+            if cloud.bond_horizon != BondHorizon::OfCentre {
+                let of_bond = cloud.bond_horizon.of([i, j], &cloud.horizon);
+                self.horizons.push(of_bond);
+            }
+            self.materials.extend(cloud.material.get(j));
+        }
+    }
+
     /// The kernel factors of the bonds of a point.
     fn fill_factors(
         &mut self,
-        i: usize,
+        (i, family): (usize, &[u32]),
         factors: &Factors<'_, D>,
         law: &dyn LinearForceState<D>,
         horizon: f64,
@@ -105,7 +126,9 @@ impl<const D: usize> Scratch<D> {
         match factors {
             Factors::Plain => self.factors.resize(self.bonds.len(), 1.0),
             Factors::Shells(f) => {
-                self.factors.extend(self.bonds.iter().map(|xi| f(i, xi)));
+                let bonds = family.iter().zip(&self.bonds);
+                self.factors
+                    .extend(bonds.map(|(&j, xi)| f([i, j as usize], xi)));
             }
             Factors::Fitted => {
                 let bonds = self.bonds.iter().copied().zip(self.volumes.iter().copied());
@@ -157,26 +180,16 @@ impl<const D: usize> PdBody<D> {
                     source,
                 };
                 let horizon = cloud.horizon.of(i);
-                let family = families.of(i).iter().map(|&j| j as usize);
-                of.bonds.clear();
-                of.bonds.extend(
-                    family
-                        .clone()
-                        .map(|j| cloud.position[j] - cloud.position[i]),
-                );
-                of.volumes.clear();
-                of.volumes.extend(family.clone().map(|j| cloud.volume[j]));
-                of.materials.clear();
-                if !cloud.material.is_empty() {
-                    of.materials.extend(family.map(|j| cloud.material[j]));
-                }
-                of.fill_factors(i, factors, law, horizon).map_err(at)?;
+                of.fill(i, &cloud, families.of(i));
+                of.fill_factors((i, families.of(i)), factors, law, horizon)
+                    .map_err(at)?;
                 law.coefficients(
                     &Family {
                         bonds: &of.bonds,
                         volumes: &of.volumes,
                         factors: &of.factors,
                         horizon,
+                        bond_horizons: &of.horizons,
                         materials: (cloud.material.get(i)).map(|&own| FamilyMaterials {
                             own,
                             far: &of.materials,
@@ -208,6 +221,16 @@ impl<const D: usize> PdBody<D> {
     /// Marks the points whose families lie with other processes: rows of these are refused.
     pub(crate) fn set_elsewhere(&mut self, elsewhere: Vec<bool>) {
         self.elsewhere = elsewhere;
+    }
+
+    /// Returns true if bonds join points of different horizons.
+    pub fn mixes_horizons(&self) -> bool {
+        let horizon = &self.cloud.horizon;
+        let differs = |i: usize| {
+            let mut family = self.families.of(i).iter();
+            family.any(|&j| horizon.of(j as usize) != horizon.of(i))
+        };
+        horizon.uniform().is_none() && (0..self.families.len()).any(differs)
     }
 
     /// Number of directed bonds.
@@ -252,6 +275,7 @@ impl<const D: usize> PdBody<D> {
             volumes: &volumes,
             factors: &[],
             horizon: self.cloud.horizon.of(i),
+            bond_horizons: &[],
             materials: None,
         };
         collapsed_tensor(&family, self.kernel(i).0, self.state(i))

@@ -21,6 +21,7 @@ fn lattice<const D: usize>(law: &dyn Law<D>) -> (LatticeBonds<D>, Tensor4<D>) {
         volumes: &volumes,
         factors: &factors,
         horizon: 3.0 * H,
+        bond_horizons: &[],
         materials: None,
     };
     let (mut pair, mut omega) = (vec![0.0; bonds.len()], vec![0.0; bonds.len()]);

@@ -264,6 +264,23 @@ impl Families {
         })
     }
 
+    /// The same, and of each point that has a family also those points with one in whose families it is: bonds between families are mutual.
+    pub(crate) fn completed(&self) -> Self {
+        let reversed = self.reversed(self.len());
+        let rows = parallel::map(self.len(), 256, |i| {
+            let seen = reversed.rows[reversed.offsets[i]..reversed.offsets[i + 1]].iter();
+            let mut row = self.of(i).to_vec();
+            if !row.is_empty() {
+                row.extend(seen.filter(|j| self.of(i).binary_search(j).is_err()));
+                row.sort_unstable();
+            }
+            row
+        });
+        Self::filled(rows.iter().map(Vec::len), |i, row| {
+            row.copy_from_slice(&rows[i]);
+        })
+    }
+
     /// Appends the families of another cloud, whose points are numbered on from those of this one.
     pub fn append(&mut self, other: &Self) {
         let (points, bonds) = (self.len() as u32, self.neighbours.len());
@@ -403,9 +420,14 @@ mod tests {
     fn retain_cuts_and_reversed_inverts() {
         let points = cloud(300, [1.0, 1.0], 11);
         let mut state = 1;
-        let horizons: Vec<f64> = (0..300).map(|_| 0.05 + 0.1 * random(&mut state)).collect();
+        let horizons: Vec<f64> = (0..300).map(|_| 0.25 + 0.25 * random(&mut state)).collect();
         let mut families = Families::search(&points, &horizons, TIE_TOLERANCE).unwrap();
+        // a point without a family of its own takes part in none
+        assert!((0..300).all(|i| !families.of(i).is_empty()));
+        let mutual = families.completed();
+        assert!(mutual.is_symmetric() && mutual.bond_count() > families.bond_count());
         let (i, j) = families.one_sided().unwrap();
+        assert!(mutual.of(j as usize).contains(&i));
         assert!(families.of(i as usize).contains(&j) && !families.of(j as usize).contains(&i));
         assert!(!families.is_symmetric());
 

@@ -16,6 +16,26 @@ pub enum Horizon {
     Field(Vec<f64>),
 }
 
+/// Horizon of a bond whose ends have different ones.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BondHorizon {
+    /// That of the family's centre, from either end.
+    #[default]
+    OfCentre,
+    /// The larger of both.
+    Larger,
+}
+
+impl BondHorizon {
+    /// Of the bond between two points, seen from the first.
+    pub fn of(self, [i, j]: [usize; 2], horizon: &Horizon) -> f64 {
+        match self {
+            Self::OfCentre => horizon.of(i),
+            Self::Larger => horizon.of(i).max(horizon.of(j)),
+        }
+    }
+}
+
 /// Horizons that differ by less than this of their size are one.
 const SAME: f64 = 1e-12;
 
@@ -34,6 +54,25 @@ impl Horizon {
                 Self::Uniform(first)
             }
             _ => Self::Field(values),
+        }
+    }
+
+    /// The same horizons by the different ones, in rising order, of which each is named once; as they are if they are too many to number.
+    #[must_use]
+    pub fn grouped(self) -> Self {
+        let Self::Field(values) = self else {
+            return self;
+        };
+        let mut horizons = values.clone();
+        horizons.sort_by(f64::total_cmp);
+        horizons.dedup();
+        if horizons.len() > usize::from(u16::MAX) {
+            return Self::Field(values);
+        }
+        let place = |v: &f64| horizons.partition_point(|h| h < v) as u16;
+        Self::PerLattice {
+            of_point: values.iter().map(place).collect(),
+            horizons,
         }
     }
 
@@ -111,6 +150,10 @@ mod tests {
         let mut flags = [true, false, false, true].into_iter();
         lattices.retain(|| flags.next() == Some(true));
         assert_eq!((lattices.of(1), lattices.lattice_of(1)), (0.2, 2));
+        let grouped = Horizon::Field(vec![0.5, 0.3, 0.5]).grouped();
+        assert_eq!((grouped.values(), grouped.of(2)), (&[0.3, 0.5][..], 0.5));
+        assert_eq!(BondHorizon::Larger.of([1, 2], &grouped), 0.5);
+        assert_eq!(BondHorizon::OfCentre.of([1, 2], &grouped), 0.3);
         let more = Horizon::Uniform(0.1).followed_by(2, &[0.2]);
         assert_eq!(more, Horizon::Field(vec![0.1, 0.1, 0.2]));
         assert_eq!(

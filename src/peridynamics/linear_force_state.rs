@@ -30,8 +30,20 @@ pub struct Family<'a, const D: usize> {
     pub factors: &'a [f64],
     /// Horizon δ of the family's centre.
     pub horizon: f64,
+    /// Horizon of each bond, where bonds have others than the centre; empty elsewhere.
+    pub bond_horizons: &'a [f64],
     /// The materials of its points; none in a body of one material.
     pub materials: Option<FamilyMaterials<'a>>,
+}
+
+impl<const D: usize> Family<'_, D> {
+    /// Horizon of a bond \[m\].
+    pub fn horizon_of(&self, bond: usize) -> f64 {
+        self.bond_horizons
+            .get(bond)
+            .copied()
+            .unwrap_or(self.horizon)
+    }
 }
 
 /// The materials of a family's points, by the numbers that [`crate::peridynamics::Several`] has for them.

@@ -72,7 +72,7 @@ pub use force_state::{
     CauchyStress, DeformedFamily, EnergyDensity, ForceState, HistoryLayout, KeptDamage, Past,
     PointStress, Present,
 };
-pub use horizon::Horizon;
+pub use horizon::{BondHorizon, Horizon};
 pub use influence::{Influence, Micromodulus};
 pub use lattice_families::Wanted;
 pub use law::{Accelerator, Calibrate, Law, Linearity, Mixture, Parameters};

@@ -344,6 +344,7 @@ mod tests {
             volumes: &volumes,
             factors: &base,
             horizon: 3.0,
+            bond_horizons: &[],
             materials: None,
         };
         fit(&family, &base, fields)
@@ -423,6 +424,7 @@ mod tests {
                 volumes: &volumes,
                 factors: &base,
                 horizon: 4.0,
+                bond_horizons: &[],
                 materials: None,
             };
             for stress in [StressFit::Affine, StressFit::Quadratic] {

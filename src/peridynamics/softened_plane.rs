@@ -253,6 +253,7 @@ mod tests {
             volumes: &vec![volume; count],
             factors: &vec![1.0; count],
             horizon: 2.0 * H,
+            bond_horizons: &[],
             materials: None,
         };
         let law = LinearPeridynamicSolid::<D>::new(Influence::Gaussian, lambda, shear);

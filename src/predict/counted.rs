@@ -45,10 +45,7 @@ pub(crate) fn counted<const D: usize>(scene: &Scene<D>) -> Option<Prediction> {
             dofs: whole(counts.dofs),
             nonzeros: whole(counts.nonzeros),
         },
-        symmetry: scene
-            .coupling
-            .build(scene.point_law.linearised())
-            .symmetry(),
+        symmetry: scene.method().symmetry(),
         unknowns: whole(counts.dofs),
         peak_memory_bytes: counts.peak(),
         base_bytes: counts.base(),

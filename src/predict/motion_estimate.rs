@@ -17,6 +17,7 @@ use crate::run::equilibrium::{may_coarsen, may_factorise};
 use crate::run::motion::dynamic_system::start;
 use crate::run::motion::impact::impacted;
 use crate::run::motion::initial_state::PreStep;
+use crate::run::motion::load_stage;
 use crate::run::motion::saved::StepChoice;
 use crate::run::motion::setup::{ModelSetup, laid_out};
 use crate::run::motion::time_step::held;
@@ -74,7 +75,7 @@ fn prediction<const D: usize>(
 ) -> Prediction {
     let sizes = sizes(laid_out.model, laid_out.operator);
     let output = match laid_out.rest.output.vtu || state.is_none() {
-        true => output_bytes(&sizes, &laid_out.rest.output),
+        true => output_bytes(laid_out.model, &sizes, &laid_out.rest.output),
         false => 0,
     };
     let peak = peak_memory_bytes().unwrap_or(0);
@@ -159,6 +160,7 @@ fn steps<const D: usize>(
         RunOptions::default(),
         CheckpointFile::new(path, Fingerprint::default()),
         None,
+        None,
     )?;
     laid_out.proof.parts.extend(begin.growth);
     let pace = begin.pace;
@@ -199,9 +201,27 @@ fn steps<const D: usize>(
             Some(Share::new("state", state_bytes)),
         )
     };
+    if let Some(stage) = &rest.before {
+        let held = held(model, &stage.conditions)?;
+        factors(&laid_out, &stage.solve, &held, &mut prediction, progress)?;
+        prediction.choices.push(load_stage::told(stage));
+    }
     prediction.warnings = warnings(model, laid_out.rest, laid_out.setup.traits, &prediction)?;
+    let before = rest.before.as_ref().map(|stage| unknown_time(&stage.solve));
+    prediction.warnings.extend(before);
     holds(&prediction)?;
     Ok(prediction)
+}
+
+/// Warns of load steps, whose time is not estimated.
+fn unknown_time(spec: &QuasiStatic) -> Warning {
+    let steps = match spec.accuracy {
+        None => format!("{} load steps", spec.steps),
+        Some(_) => "the load steps, and their number,".to_owned(),
+    };
+    let text =
+        format!("the time of {steps} is not in the estimate: it depends on the bonds that break");
+    Warning::new(Code::Cost, text)
 }
 
 /// The steps of a run.
@@ -256,16 +276,7 @@ pub(crate) fn load_steps<const D: usize>(
             laid_out.setup.traits,
             &prediction,
         )?;
-        prediction.warnings.push(Warning::new(
-            Code::Cost,
-            format!(
-                "the time of {} is not in the estimate: it depends on the bonds that break",
-                match spec.accuracy {
-                    None => format!("{} load steps", spec.steps),
-                    Some(_) => "the load steps, and their number,".to_owned(),
-                }
-            ),
-        ));
+        prediction.warnings.push(unknown_time(spec));
         if laid_out.rest.breaking.damages {
             // small runs may take minutes where cracks open
             prediction.no_error =

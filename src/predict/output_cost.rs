@@ -9,6 +9,7 @@ use crate::model::Model;
 use crate::observe::ObserveError;
 use crate::observe::summary::Sizes;
 use crate::observe::vtu::{Compression, write_vtu};
+use crate::run::bonds;
 use crate::run::setup::RunSettings;
 use crate::run::solution::{Moved, Solved, zone_of_site};
 use crate::run::write::{Shown, snapshot, write};
@@ -25,12 +26,17 @@ const OUTPUT_BYTES: u64 = 900;
 const CORNER_BYTES: u64 = 250;
 
 /// Bytes of the output while it is encoded.
-pub(crate) fn output_bytes<const D: usize>(sizes: &Sizes, output: &Output<D>) -> u64 {
+pub(crate) fn output_bytes<const D: usize>(
+    model: &Model<D>,
+    sizes: &Sizes,
+    output: &Output<D>,
+) -> u64 {
     let corners = match output.points {
         PointOutputSpec::Vertices => 0,
         PointOutputSpec::Cells => ((1 << D) - 1) * sizes.points as u64,
     };
-    OUTPUT_BYTES * (sizes.cells + sizes.points) as u64 + CORNER_BYTES * corners
+    let of_body = OUTPUT_BYTES * (sizes.cells + sizes.points) as u64 + CORNER_BYTES * corners;
+    of_body.max(bonds::bytes(model, output))
 }
 
 /// Folders so far, so that each has a name of its own.

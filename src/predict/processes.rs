@@ -8,7 +8,7 @@ use crate::progress::Progress;
 use crate::run::chosen::with_choice;
 use crate::run::equilibrium;
 use crate::run::motion::dynamic_system::{LayoutStart, dynamic};
-use crate::run::motion::{Sharing, may_share, may_share_rows, moves_own_sites};
+use crate::run::motion::{Sharing, has_one_stage, may_share, may_share_rows, moves_own_sites};
 use crate::run::{AnyScene, RunError, setup};
 use crate::scene::{Scene, Solve};
 use crate::solve::statics::Method;
@@ -73,11 +73,9 @@ fn shares<const D: usize>(
     partitioner: Option<&dyn Ranks>,
     progress: &dyn Progress,
 ) -> Result<Processes, RunError> {
+    has_one_stage(&scene)?;
     let is_static = scene.solve == Solve::Static;
-    let explicit = match &scene.solve {
-        Solve::Explicit(spec) => Some(spec.clone()),
-        _ => None,
-    };
+    let explicit = scene.solve.motion().cloned();
     let (problem, rest) = setup::problem(scene);
     let is_shared = match &explicit {
         Some(_) => may_share(&problem, &rest),

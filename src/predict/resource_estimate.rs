@@ -183,7 +183,7 @@ pub(crate) fn predict<const D: usize>(
     plan.add_seconds(&mut timings);
     let output = output_seconds(&model, &operator, &rest, false)?;
     timings.add("output", output.iter().sum());
-    let output = output_bytes(&sizes, &rest.output);
+    let output = output_bytes(&model, &sizes, &rest.output);
     let base_bytes = laid_out + PROGRAM;
     let peak = base_bytes + plan.stiffness + plan.solver.max(output);
     let items = [

@@ -22,6 +22,7 @@ use crate::scene::draft::Draft;
 use crate::scene::expression::Expression;
 use crate::scene::rim;
 use crate::scene::source::read;
+use crate::scene::validated::Output;
 use crate::scene::{Scene, SceneError, SceneSpec, Solve, Source};
 use crate::system::Ranks;
 
@@ -50,7 +51,12 @@ fn run<const D: usize>(
 ) -> Result<RunSummary, RunError> {
     let is_static = scene.solve == Solve::Static;
     let processes = options.writers().map_or(1, Ranks::count);
-    let claim = || scene.output.claim(&scene.title, !is_static, processes);
+    let of_stage = (scene.before.iter()).map(|stage| scene.output.of_stage(&stage.name));
+    let outputs: Vec<_> = of_stage.chain([scene.output.clone()]).collect();
+    let claim = || {
+        let each = |output: &Output<D>| output.claim(&scene.title, !is_static, processes);
+        outputs.iter().map(each).collect::<Result<Vec<_>, _>>()
+    };
     let claimed = options.writes().then(claim).transpose();
     let _claim = agreed(options.ranks, claimed, &scene.output.directory)?;
     let (unused, policy) = (scene.unused(), scene.warnings.clone());

@@ -7,7 +7,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::mesh::Mesh;
-use crate::model::{CellRole, PointSource, Reach, Zone};
+use crate::model::{CellRole, PointSource, Reach};
 use crate::observe::report::number;
 use crate::observe::summary::{bytes_text, grouped, resident_memory_bytes};
 use crate::peridynamics::BondWeights;
@@ -125,15 +125,12 @@ impl Counts {
             ..Self::default()
         };
         let of_elements = |nodes: f64| nodes * 3f64.powi(D as i32) * (D * D) as f64;
-        let Some(p) = &scene.peridynamics else {
+        let (Some(p), Some(law)) = (&scene.peridynamics, &scene.point_law) else {
             counts.dofs = (mesh.nodes.len() * D) as f64;
             counts.nonzeros = of_elements(mesh.nodes.len() as f64);
             return counts;
         };
-        let material = (scene.zones.iter().zip(&scene.cell_material))
-            .find(|(zone, _)| **zone != Zone::Local)
-            .map_or(0, |(_, m)| usize::from(*m));
-        let law = scene.materials[material].law.linearised();
+        let law = law.linearised();
         let coupling = scene.coupling.build(law);
         let horizon: Vec<f64> = (0..mesh.cell_count())
             .map(|c| p.horizon_at(&mesh.centroid(c)))
@@ -475,7 +472,7 @@ impl Counts {
         let fastest = scene
             .materials
             .iter()
-            .map(|m| ((m.lame.0 + 2.0 * m.lame.1) / m.density).sqrt())
+            .map(|m| (m.stiffness().longitudinal_modulus() / m.density).sqrt())
             .fold(0.0, f64::max);
         0.5 * h / fastest
     }

@@ -40,6 +40,7 @@ fn with_each<const D: usize, T>(
     // these know the body before its patch, if it has one
     other.output.sections = sections;
     other.solve = scene.solve.clone();
+    other.before.clone_from(&scene.before);
     other.solver = scene.solver;
     other.title = scene.title.clone();
     let is_typed = scene.coupling_why.is_none();

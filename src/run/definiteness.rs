@@ -26,13 +26,13 @@ const SHIFT: f64 = 1e-10;
 /// [`RunError::Indefinite`] if the matrix has a negative eigenvalue, or is too large to be factorised.
 pub(crate) fn check<const D: usize>(
     (model, operator, ranks): (&Model<D>, &Operator<'_, D>, Option<&dyn Ranks>),
-    ratio: Ratio,
+    ratio: Option<Ratio>,
     choices: &mut Vec<Decision>,
     progress: &dyn Progress,
 ) -> Result<(), RunError> {
-    if operator.definiteness != Definiteness::NegativeTerms {
+    let Some(ratio) = ratio.filter(|_| operator.definiteness == Definiteness::NegativeTerms) else {
         return Ok(());
-    }
+    };
     let refused = |what: String| RunError::Indefinite {
         what,
         typed: ratio.typed,

@@ -91,6 +91,31 @@ pub enum RunError {
     /// The zone cannot have a rim of its own.
     #[error("{0}")]
     Rim(String),
+    /// A condition that begins with a motion prescribes another displacement than load steps before it have left.
+    #[error(
+        "`conditions.{condition}` prescribes the {axis} displacement {prescribed:.6e} at ({}), where the load steps have left {left:.6e}: the body would jump; prescribe a velocity, which begins where the body is, let the condition act in the load steps as well, or free the component",
+        place.iter().map(|x| format!("{x:.4e}")).collect::<Vec<_>>().join(", ")
+    )]
+    Jump {
+        /// The condition.
+        condition: String,
+        /// The axis.
+        axis: &'static str,
+        /// A site that it holds, at rest.
+        place: Vec<f64>,
+        /// What it prescribes at time zero.
+        prescribed: f64,
+        /// The displacement of the load steps.
+        left: f64,
+    },
+    /// Several processes run a scene in stages.
+    #[error(
+        "several processes run a scene in stages, and the load steps of `{stage}` leave their state on one of them; run it by one process"
+    )]
+    LoadStageShared {
+        /// The load steps.
+        stage: String,
+    },
     /// The state cannot be carried over to other zones.
     #[error(transparent)]
     Carry(#[from] CarryError),
@@ -160,6 +185,14 @@ pub enum RunError {
         /// Number of sites beyond it.
         sites: usize,
     },
+    /// A selection of bonds without any.
+    #[error("`output.bonds.{selection}`: {remedy}")]
+    NoBonds {
+        /// Its name.
+        selection: String,
+        /// The reason, and the remedy.
+        remedy: &'static str,
+    },
     /// An impactor lies over the body at time zero.
     #[error(
         "the impactor `{impactor}` lies over the body at time zero, by {depth:.4e} at ({}): move it back by as much", place.iter().map(|x| format!("{x:.4e}")).collect::<Vec<_>>().join(", ")
@@ -226,6 +259,7 @@ impl RunError {
             Self::NoCoupling { tried } => tried.last().and_then(|(_, error)| error.place()),
             Self::Idle { condition, .. } => Some(format!("conditions.{condition}")),
             Self::EmptySection { section, .. } => Some(format!("output.sections.{section}")),
+            Self::NoBonds { selection, .. } => Some(format!("output.bonds.{selection}")),
             _ => None,
         }
     }

@@ -57,7 +57,7 @@ impl<const D: usize> SceneModel<D> {
         Ok(LinearMotion {
             stiffness: self.model.assemble(&operator, &Silent),
             mass: masses(&self.model, |material| self.density[material as usize]),
-            symmetry: self.coupling.symmetry(),
+            symmetry: self.model.symmetry(),
         })
     }
 }

@@ -166,7 +166,7 @@ impl<'m, const D: usize> LinearParts<'m, D> {
 
     fn departure(&self, material: u16, strain: &Tensor<D>, time: f64) -> Departure {
         let law = &self.rest.materials[usize::from(material)].law;
-        law.departure(strain, time)
+        (law.as_ref()).map_or(Departure::None, |law| law.departure(strain, time))
     }
 
     fn material_at(&self, point: usize) -> u16 {
@@ -317,7 +317,7 @@ impl<'m, const D: usize> LinearParts<'m, D> {
     fn expansion(&self, point: usize, x: &Vector<D>, time: f64) -> f64 {
         let thermal = self.rest.stresses.thermal.as_ref();
         thermal.map_or(0.0, |thermal| {
-            thermal.expansion[usize::from(self.material_at(point))] * thermal.rise_at(x, time)
+            thermal.stretch_at(x, self.material_at(point), time)
         })
     }
 

@@ -29,7 +29,7 @@
 //! | `sections.rs` | force and moment that the part of the body beyond a plane exerts on the rest |
 //! | `balance.rs`, `rotation.rs`, `surface_gradient.rs`, `warnings.rs` | balance of loads and reactions; rotation of elements; stresses that families do not resolve; properties of a model that make its results doubtful |
 //! | `linear_parts.rs` | elements, rows and bonds that are linear, or stay whole, beyond where their material is |
-//! | `write.rs` | the files of a run |
+//! | `write.rs`, `bonds.rs` | the files of a run; bonds as lines |
 //! | `pieces.rs`, `point_cells.rs`, `parts.rs` | the piece of a VTU file that a process writes; the cells shown around points; the parts shown of cut elements |
 //! | `error.rs` | errors of a run, with place and remedy |
 //! | `block.rs`, `observed_tests.rs` | a block from a scene, for unit tests; tests of the data that an observer receives |
@@ -38,6 +38,7 @@ mod any_scene;
 mod balance;
 #[cfg(test)]
 pub(crate) mod block;
+pub(crate) mod bonds;
 pub mod budget;
 pub mod chosen;
 pub(crate) mod condition_terms;

@@ -6,21 +6,9 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::mesh::CellShape;
+use crate::mesh::{CellShape, boxes};
 use crate::model::{CellRole, Model, PointSource};
 use crate::tensor::{Vector, padded};
-
-/// Corners of a lattice cell in VTK's order, in halves of its edge: the first two in one dimension, four in two.
-const CORNERS: [[f64; 3]; 8] = [
-    [-1.0, -1.0, -1.0],
-    [1.0, -1.0, -1.0],
-    [1.0, 1.0, -1.0],
-    [-1.0, 1.0, -1.0],
-    [-1.0, -1.0, 1.0],
-    [1.0, -1.0, 1.0],
-    [1.0, 1.0, 1.0],
-    [-1.0, 1.0, 1.0],
-];
 
 /// Source of the cells of a model's points.
 pub(super) struct PointCells<'a, const D: usize> {
@@ -64,13 +52,7 @@ impl<'a, const D: usize> PointCells<'a, D> {
             let corners = corners.map(|&n| padded(&mesh.nodes[n as usize])).collect();
             return (mesh.shapes[c as usize].linear(), corners);
         }
-        let half = 0.5 * self.size(point);
-        let shape = match D {
-            1 => CellShape::Line2,
-            2 => CellShape::Quad4,
-            _ => CellShape::Hex8,
-        };
-        let corner = |s: &[f64; 3]| padded(&Vector::<D>::from_fn(|i, _| x[i] + half * s[i]));
-        (shape, CORNERS[..1 << D].iter().map(corner).collect())
+        let (shape, corners) = boxes::around(x, 0.5 * self.size(point));
+        (shape, corners.map(|corner| padded(&corner)).collect())
     }
 }

@@ -216,7 +216,7 @@ fn remedy<const D: usize>(
 /// `½ ε* : C : (ε* − S : ε*)` for a misfit of 1.
 fn misfit_stiffness<const D: usize>(model: &Model<D>, cell: usize) -> f64 {
     let c = model.tensor_of_cell(cell);
-    let (mu, lambda) = (c.get(0, 1, 0, 1), c.get(0, 0, 1, 1));
+    let (lambda, mu) = c.isotropic_part();
     if D == 2 {
         let bulk = lambda + mu;
         return 2.0 * bulk * mu / (bulk + mu);

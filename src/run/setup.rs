@@ -9,6 +9,7 @@ use crate::observe::warning::Policy;
 use crate::peridynamics::PartialVolume;
 use crate::peridynamics::bond_force::BondKinematics;
 use crate::progress::Progress;
+use crate::run::bonds;
 use crate::run::error::RunError;
 use crate::run::stress_settings::StressSettings;
 use crate::scene::adaptive_zone::Follow;
@@ -17,7 +18,8 @@ use crate::scene::expression::Expression;
 use crate::scene::failure::Breaking;
 use crate::scene::impactors::Impactor;
 use crate::scene::initial::Initial;
-use crate::scene::materials::{Material, Ratio};
+use crate::scene::load_stage::LoadStage;
+use crate::scene::materials::{Material, Ratio, elastic_cells};
 use crate::scene::solve::Solve;
 use crate::scene::spec::{CouplingTraits, ElementsSpec};
 use crate::scene::validated::{Output, Scene, Solver};
@@ -25,7 +27,7 @@ use crate::system::Ranks;
 use crate::tensor::padded;
 use crate::{
     coupling::{Coupling, Operator, Problem},
-    model::{self, ElasticCells, HorizonField, Model, ZonedBody},
+    model::{self, HorizonChange, HorizonField, Model, Zone, ZonedBody},
 };
 
 /// A typed horizon.
@@ -37,7 +39,10 @@ fn horizon_field<const D: usize>(horizon: Expression) -> HorizonField<D> {
 }
 
 /// Settings of a scene that remain once its problem is built.
+#[derive(Clone)]
 pub struct RunSettings<const D: usize> {
+    /// Load steps before a motion, whose last state of equilibrium it begins with.
+    pub before: Option<LoadStage<D>>,
     /// Supports and loads.
     pub conditions: Vec<Condition<D>>,
     /// Solver of the systems of equations.
@@ -52,8 +57,8 @@ pub struct RunSettings<const D: usize> {
     pub breaking: Breaking<D>,
     /// True for a scene in time.
     pub is_in_time: bool,
-    /// Poisson's ratio of the points.
-    pub ratio: Ratio,
+    /// Poisson's ratio of the points; none of a body whose materials have none.
+    pub ratio: Option<Ratio>,
     /// Rule by which the nonlocal zone follows damage, where it does.
     pub follow: Option<Follow>,
     /// Kinds of warnings that are not accepted.
@@ -101,6 +106,17 @@ pub(crate) fn same_everywhere<const D: usize>(
 }
 
 impl<const D: usize> RunSettings<D> {
+    /// The settings of load steps before the motion of a scene: what acts in them, and their files. All else is that of the motion, whose forces they balance.
+    pub fn of_load_stage(&self, stage: &LoadStage<D>) -> Self {
+        Self {
+            conditions: stage.conditions.clone(),
+            output: self.output.of_stage(&stage.name),
+            initial: Vec::new(),
+            impactors: Vec::new(),
+            ..self.clone()
+        }
+    }
+
     /// Returns the choices for the accuracy, the zone and the coupling, in this order.
     pub fn made(&self) -> impl Iterator<Item = &Decision> {
         self.choices.iter().chain(&self.placed).chain(&self.chosen)
@@ -175,24 +191,24 @@ impl<const D: usize> RunSettings<D> {
 pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) {
     let stresses = StressSettings::of(&scene);
     let material = scene.point_materials[0];
-    let law = Arc::clone(&scene.point_law);
     // of several the one that is farthest below bonds that act alone
-    let ratios = scene.point_materials.iter().map(|&m| {
-        let stuff = &scene.materials[usize::from(m)];
-        Ratio::new(stuff.lame, scene.kinematics)
+    let ratios = scene.point_materials.iter().filter_map(|&m| {
+        let lame = scene.materials[usize::from(m)].lame()?;
+        Some(Ratio::new(lame, scene.kinematics))
     });
-    let least = ratios.min_by(|a, b| a.typed.total_cmp(&b.typed));
-    let first = &scene.materials[usize::from(material)];
-    let ratio = least.unwrap_or_else(|| Ratio::new(first.lame, scene.kinematics));
-    let method = scene.coupling.build(law.linearised());
+    let ratio = ratios.min_by(|a, b| a.typed.total_cmp(&b.typed));
+    let method = scene.method();
     let chosen = scene.coupling_why.map(|why| Decision {
         choice: format!("coupling {}", scene.coupling.traits().name),
         why,
     });
-    let tensors = scene.materials.iter().map(|m| m.stiffness()).collect();
+    let cells = scene.cell_material;
+    let elastic = elastic_cells(&scene.materials, cells, material, &scene.mesh);
     let density = scene.materials.iter().map(|m| m.density).collect();
     let (voids, barriers) = (scene.voids, scene.barriers);
-    let peridynamics = scene.peridynamics.map(|p| model::Peridynamics {
+    let points = scene.peridynamics.zip(scene.point_law);
+    let peridynamics = points.map(|(p, law)| model::Peridynamics {
+        horizon_change: p.horizon_change,
         law,
         horizon: horizon_field(p.horizon),
         points: p.points,
@@ -207,16 +223,13 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
             body: ZonedBody {
                 mesh: scene.mesh,
                 zones: scene.zones,
-                elastic: ElasticCells {
-                    tensors,
-                    material: scene.cell_material,
-                    of_points: material,
-                },
+                elastic,
                 peridynamics,
             },
             coupling: method,
         },
         RunSettings {
+            before: scene.before,
             conditions: scene.conditions,
             solver: scene.solver,
             warnings: scene.warnings,
@@ -243,13 +256,15 @@ pub fn problem<const D: usize>(scene: Scene<D>) -> (Problem<D>, RunSettings<D>) 
 /// The model of a problem, whose elements follow what the scene says of them.
 ///
 /// # Errors
-/// [`RunError::Model`] for one that cannot be laid out.
+/// [`RunError::Model`] for one that cannot be laid out, [`RunError::NoBonds`] for output without a bond.
 pub(crate) fn model<const D: usize>(
     problem: Problem<D>,
     rest: &RunSettings<D>,
     progress: &dyn Progress,
 ) -> Result<(Model<D>, Box<dyn Coupling<D>>), RunError> {
-    shared_model(problem, rest, None, progress)
+    let found = shared_model(problem, rest, None, progress)?;
+    bonds::check(&found.0, &rest.output, None)?;
+    Ok(found)
 }
 
 /// Collective: as [`model`], with its families spread over processes where they can be.
@@ -288,10 +303,40 @@ pub fn sizes<const D: usize>(model: &Model<D>, operator: &Operator<'_, D>) -> Si
 pub fn model_choices<const D: usize>(model: &Model<D>) -> Vec<Decision> {
     let all = [
         volumes_choice(model),
+        horizon_choice(model),
         border_choice(model),
         elements_choice(model),
     ];
     all.into_iter().flatten().collect()
+}
+
+/// Says by which rule bonds join points of different horizons, where they do.
+fn horizon_choice<const D: usize>(model: &Model<D>) -> Option<Decision> {
+    let (p, body) = (model.peridynamics.as_ref()?, model.body()?);
+    let why = match p.horizon_change {
+        // of a transition zone the stresses of points count
+        HorizonChange::Dual
+            if model.zones.contains(&Zone::Transition) || !body.mixes_horizons() =>
+        {
+            return None;
+        }
+        HorizonChange::Dual => {
+            "each point has the force state of its own horizon, which acts at both ends of its bonds: forces are pairs"
+        }
+        HorizonChange::MultiHorizon => {
+            "a bond has the larger horizon of its ends, weakened for the other: forces are pairs"
+        }
+        HorizonChange::Splice => {
+            "each point sees all others with its own horizon: a uniform strain leaves no force, and forces are no pairs"
+        }
+    };
+    Some(Decision {
+        choice: format!(
+            "horizons change by the rule \"{}\"",
+            p.horizon_change.name()
+        ),
+        why: why.to_owned(),
+    })
 }
 
 /// Says how large the elements beside the points are, where there are both.

@@ -78,8 +78,8 @@ pub(super) fn with_contact<'a, const D: usize>(
     }
     let mut clock = Stopwatch::start();
     let knows_temperature = rest.stresses.thermal.is_some();
-    let (coupling, op) = (at.coupling, at.operator);
-    let mut own = motion::dynamic_system::still(model, coupling, op, rest, knows_temperature)?;
+    let op = at.operator;
+    let mut own = motion::dynamic_system::still(model, op, rest, knows_temperature)?;
     let mut linear = own.is_none().then(|| LinearMotion {
         stiffness: model.assemble(op, progress),
         mass: vec![1.0; model.sites.len()],

@@ -1,5 +1,6 @@
 //! From a static scene to its solution.
 
+use super::bonds;
 use super::chosen::with_choice;
 use super::conduction::heated_problem;
 use super::equilibrium::{Assembled, Equilibrium, StaticInput, equilibrium};
@@ -132,13 +133,14 @@ fn solve_chosen<const D: usize>(
             (&fresh.0, fresh.1.as_ref())
         }
     };
+    bonds::check(model, &rest.output, ranks)?;
     watch.lap(&mut timings, "sites and bonds");
     let operator = coupling.operator(model)?;
     let mut choices: Vec<Decision> = rest.made().cloned().collect();
     let rows = (model, &operator, ranks);
     definiteness::check(rows, rest.ratio, &mut choices, progress)?;
     watch.lap(&mut timings, "assembly");
-    let mut system = motion::dynamic_system::still(model, coupling, &operator, &rest, false)?;
+    let mut system = motion::dynamic_system::still(model, &operator, &rest, false)?;
     let body = StaticBody {
         model,
         coupling,
@@ -331,6 +333,7 @@ impl<'a, const D: usize> StaticBody<'a, D> {
             why: format!("{} system of {unknowns} unknowns", symmetry.name()),
         });
         choices.extend(model_choices(self.model));
+        choices.extend(bonds::told(self.model, &self.rest.output));
         choices
     }
 
@@ -381,7 +384,7 @@ impl<'a, const D: usize> StaticBody<'a, D> {
         // strains of free expansion are no stress
         if stresses.thermal.is_none() {
             let asked = Asked {
-                kinematics: stresses.kinematics,
+                stresses,
                 displacement: &solution.displacement,
                 uniform: proof.largest("stress error"),
             };

@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
-use super::thermal::{TemperatureField, Thermal};
-use crate::material::{Kinematics, LocalLaw};
+use super::thermal::{Expansion, TemperatureField, Thermal};
+use crate::material::{Axes, Kinematics, LocalLaw, Orthotropic};
 use crate::peridynamics::bond_force::BondKinematics;
+use crate::scene::elasticity::Elasticity;
 use crate::scene::expression::Expression;
 use crate::scene::materials::{Material, Ratio};
 use crate::scene::temperature::TemperatureValue;
 use crate::scene::validated::{FieldChoice, Scene};
+use crate::tensor::{Tensor, Vector};
 
 /// Thermal part of a scene's stresses, and the quantities that are made of stresses.
 #[derive(Clone, Debug)]
@@ -25,20 +27,65 @@ pub struct StressSettings<const D: usize> {
     pub bonds: BondKinematics,
     /// The local law of each material's elements, of those whose elements are not linear by their material.
     pub local_laws: Vec<Option<Arc<dyn LocalLaw<D>>>>,
-    /// Poisson's ratio and `E α` of each material.
-    pub constants: Vec<(f64, f64)>,
+    /// The stress out of the plane of each material.
+    pub elastic: Vec<ElasticSolid<D>>,
+}
+
+/// Constants of a linear elastic solid in plane strain, whose stress out of the plane follows from that within.
+#[derive(Clone, Debug)]
+pub enum ElasticSolid<const D: usize> {
+    /// `σ_zz = ν (σ_xx + σ_yy) − E α ΔT`.
+    Isotropic {
+        /// Poisson's ratio ν.
+        ratio: f64,
+        /// Young's modulus E \[Pa\].
+        young: f64,
+        /// Thermal expansion α per degree.
+        expansion: f64,
+    },
+    /// By the constants along its axes.
+    Orthotropic(Orthotropic<D>, Axes<D>),
+}
+
+impl<const D: usize> ElasticSolid<D> {
+    fn new(material: &Material<D>, kinematics: Kinematics) -> Self {
+        match &material.elasticity {
+            Elasticity::Isotropic { lambda, shear } => {
+                let ratio = Ratio::new((*lambda, *shear), kinematics).typed;
+                Self::Isotropic {
+                    ratio,
+                    young: 2.0 * shear * (1.0 + ratio),
+                    expansion: material.expansion.unwrap_or(0.0),
+                }
+            }
+            Elasticity::Orthotropic { body, axes } => Self::Orthotropic(body.clone(), axes.clone()),
+        }
+    }
+
+    /// Twice the energy per volume and squared degree of a body that the plane holds back across and that is free within.
+    fn held_energy(&self, kinematics: Kinematics) -> f64 {
+        match self {
+            Self::Isotropic {
+                young, expansion, ..
+            } => match kinematics {
+                Kinematics::PlaneStrain => young * expansion * expansion,
+                _ => 0.0,
+            },
+            Self::Orthotropic(body, _) => body.held_energy(),
+        }
+    }
 }
 
 impl<const D: usize> StressSettings<D> {
     /// Of a scene; one whose temperature is solved for stays at its reference until [`heated_problem`](super::conduction::heated_problem) has the solution.
     pub fn of(scene: &Scene<D>) -> Self {
         let kinematics = scene.kinematics;
-        let ratio = |m: &Material<D>| Ratio::new(m.lame, kinematics).typed;
-        let stiffness = |m: &Material<D>| 2.0 * m.lame.1 * (1.0 + ratio(m));
-        let alpha = |m: &Material<D>| m.expansion.unwrap_or(0.0);
-        let of_solid = |m| match kinematics {
-            Kinematics::PlaneStrain => (1.0 + ratio(m)).recip(),
-            Kinematics::Bar | Kinematics::PlaneStress | Kinematics::Solid => 1.0,
+        let elastic = |m: &Material<D>| ElasticSolid::new(m, kinematics);
+        let of_solid = |m: &Material<D>| match (elastic(m), kinematics) {
+            (ElasticSolid::Isotropic { ratio, .. }, Kinematics::PlaneStrain) => {
+                (1.0 + ratio).recip()
+            }
+            _ => 1.0,
         };
         let cells = scene.mesh.cell_count().max(1);
         let (low, high) = scene.mesh.bounds();
@@ -50,7 +97,17 @@ impl<const D: usize> StressSettings<D> {
             }),
             reference: temperature.reference,
             expansion: (scene.materials.iter())
-                .map(|m| alpha(m) / of_solid(m))
+                .map(|m| match &m.elasticity {
+                    Elasticity::Isotropic { .. } => {
+                        Expansion::Isotropic(m.expansion.unwrap_or(0.0) / of_solid(m))
+                    }
+                    Elasticity::Orthotropic { body, axes } => {
+                        Expansion::Orthotropic(body.clone(), axes.clone())
+                    }
+                })
+                .collect(),
+            held: (scene.materials.iter())
+                .map(|m| elastic(m).held_energy(kinematics))
                 .collect(),
             solid: scene.materials.iter().map(of_solid).collect(),
             reach: 0.25 * size,
@@ -62,11 +119,27 @@ impl<const D: usize> StressSettings<D> {
             kinematics,
             bonds: scene.breaking.bonds,
             local_laws: (scene.materials.iter())
-                .map(|m| m.law.local_law().filter(|law| !law.is_linear()))
+                .map(|m| m.local_law().filter(|law| !law.is_linear()))
                 .collect(),
-            constants: (scene.materials.iter())
-                .map(|m| (ratio(m), stiffness(m) * alpha(m)))
-                .collect(),
+            elastic: scene.materials.iter().map(elastic).collect(),
+        }
+    }
+
+    /// The normal stress out of the plane \[Pa\] of a material under a stress within it and a rise of the temperature; zero but in plane strain. Axes are those at `x`.
+    pub fn across(&self, material: u16, x: &Vector<D>, stress: &Tensor<D>, rise: f64) -> f64 {
+        match (&self.elastic[usize::from(material)], self.kinematics) {
+            (
+                ElasticSolid::Isotropic {
+                    ratio,
+                    young,
+                    expansion,
+                },
+                Kinematics::PlaneStrain,
+            ) => ratio * stress.trace() - young * expansion * rise,
+            (ElasticSolid::Orthotropic(body, axes), Kinematics::PlaneStrain) => {
+                body.across(&axes.at(x), stress, rise)
+            }
+            _ => 0.0,
         }
     }
 

@@ -112,7 +112,7 @@ impl<const D: usize> Solved<'_, D> {
         let material = model.material_of_cell(c);
         let told = (self.state()).and_then(|state| state.stress_of_cell(c, self.displacement));
         if let Some(told) = told {
-            return self.complete(told.tensor(), told.across, material, &x);
+            return self.complete(told.tensor(), told.across, material, (&x, &x));
         }
         let own = |u: &[f64]| self.operator.cell_stress(c, u);
         let tensor = match own(self.displacement) {
@@ -126,7 +126,7 @@ impl<const D: usize> Solved<'_, D> {
             }
             None => model.tensor_of_cell(c).contract(&gradient()),
         };
-        self.complete(tensor, None, material, &x)
+        self.complete(tensor, None, material, (&x, &model.mesh.centroid(c)))
     }
 
     /// Stress of a point over the bonds of its family that stand: the Cauchy stress of exact bonds, of a nonlinear law and of one with memory, the linear stress of others. These change by `beyond`, a change of the displacement gradient away from the point.
@@ -149,7 +149,7 @@ impl<const D: usize> Solved<'_, D> {
         let material = material_of(p);
         let u = self.displacement;
         if let Some(told) = self.state().and_then(|state| state.stress_of_site(site, u)) {
-            return self.complete(told.tensor(), told.across, material, &x);
+            return self.complete(told.tensor(), told.across, material, (&x, &x));
         }
         if let Some(law) = self.exact_law() {
             let free = |j: usize| {
@@ -159,7 +159,7 @@ impl<const D: usize> Solved<'_, D> {
                 self.thermal().map_or(0.0, at)
             };
             let (told, _) = body.exact_response(p, law, u, |j| stands(p, j), free);
-            return self.complete(told.tensor, told.across, material, &x);
+            return self.complete(told.tensor, told.across, material, (&x, &x));
         }
         let of = |u: &[f64]| body.partial_stress_of(p, u, |j| stands(p, j));
         let thermal = self.thermal().map(|(thermal, t)| {
@@ -174,7 +174,7 @@ impl<const D: usize> Solved<'_, D> {
         {
             tensor += law.linearised().tensor().contract(&beyond);
         }
-        self.complete(tensor, None, material, &x)
+        self.complete(tensor, None, material, (&x, &x))
     }
 
     /// The state of what has forces that are not linear.
@@ -198,7 +198,7 @@ impl<const D: usize> Solved<'_, D> {
     /// Returns true if stresses of points or of elements turn with the body.
     pub(super) fn has_cauchy_stresses(&self) -> bool {
         let model = self.model;
-        let mut materials = 0..self.stresses.0.constants.len() as u16;
+        let mut materials = 0..self.stresses.0.elastic.len() as u16;
         let elements = materials.any(|m| self.is_objective(m));
         let points = model.body().is_some_and(|_| self.has_exact_bonds());
         elements || points
@@ -237,19 +237,18 @@ impl<const D: usize> Solved<'_, D> {
         (is_exact && states.history().is_empty()).then_some(states)
     }
 
-    /// A stress with the one out of the plane: in plane strain, where the law does not tell it, that of an isotropic elastic body, `ν (σ_xx + σ_yy) − E α ΔT`.
+    /// A stress with the one out of the plane: in plane strain, where the law does not tell it, that of an elastic body at the temperature of `x`, whose axes are those at `axes_at`.
     fn complete(
         &self,
         tensor: Tensor<D>,
         told: Option<f64>,
         material: u16,
-        x: &Vector<D>,
+        (x, axes_at): (&Vector<D>, &Vector<D>),
     ) -> Stress<D> {
         let (settings, t) = self.stresses;
         let elastic = || {
-            let (ratio, per_degree) = settings.constants[usize::from(material)];
             let rise = settings.thermal.as_ref().map_or(0.0, |th| th.rise_at(x, t));
-            ratio * tensor.trace() - per_degree * rise
+            settings.across(material, axes_at, &tensor, rise)
         };
         Stress {
             tensor,

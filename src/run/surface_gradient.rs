@@ -2,19 +2,19 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::material::Kinematics;
 use crate::observe::report::number;
 use crate::observe::warning::{Code, Quantity, Warning};
+use crate::run::stress_settings::StressSettings;
 use crate::shape::Barrier;
 use crate::system::Ranks;
 use crate::tensor::{Tensor, Tensor4, Vector, inverse, strain};
 use crate::{
     fem,
-    model::{HorizonField, Model, PointSource, SiteKind},
+    model::{Bins, HorizonField, Model, PointSource, SiteKind},
     parallel,
 };
 
-use super::slopes::{Slopes, Teller};
+use super::slopes::{Slope, Slopes, Teller};
 use super::stresses::{principal, von_mises};
 
 /// The share of the largest stress that families may miss without a warning: that of a bent beam whose depth is ten horizons.
@@ -23,15 +23,18 @@ const MISSED: f64 = 0.08;
 /// Distance of a family's centroid from its point, over the horizon, from which the point is taken to lie at a surface; 0.42 at a plane one of a plate, 3/8 of a solid.
 const ONE_SIDED: f64 = 0.2;
 
-/// Error of the largest stress beside a seam from which on it is told.
+/// Error of a stress beside a seam, over the largest one, from which on it is told.
 const BENT: f64 = 0.05;
+
+/// Part of the largest stress from which on a stress beside a seam is looked at.
+const LARGE: f64 = 0.3;
 
 /// Error of a stress over the difference of an element's own from a linear fit to those around: of peaks at holes, bores and notches on drawn lattices (`bondline verify warnings`) it was 0.39 and 0.45 of it.
 const OF_DIFFERENCE: f64 = 0.5;
 
 /// Data for the check of the stresses of a displacement.
-pub(super) struct Asked<'a> {
-    pub kinematics: Kinematics,
+pub(super) struct Asked<'a, const D: usize> {
+    pub stresses: &'a StressSettings<D>,
     /// The displacement of the sites \[m\].
     pub displacement: &'a [f64],
     /// The part of itself by which a uniform stress is wrong at surfaces.
@@ -42,7 +45,7 @@ pub(super) struct Asked<'a> {
 pub(super) fn steep_stresses<const D: usize>(
     model: &Model<D>,
     ranks: Option<&dyn Ranks>,
-    asked: &Asked<'_>,
+    asked: &Asked<'_, D>,
 ) -> Vec<Warning> {
     if D == 1 || model.body().is_none() {
         return Vec::new();
@@ -85,7 +88,7 @@ fn bonds<const D: usize>(
 fn point_stresses<const D: usize>(
     model: &Model<D>,
     ranks: Option<&dyn Ranks>,
-    asked: &Asked<'_>,
+    asked: &Asked<'_, D>,
 ) -> Vec<f64> {
     let (Some(body), Some(p)) = (model.body(), &model.peridynamics) else {
         return Vec::new();
@@ -94,7 +97,10 @@ fn point_stresses<const D: usize>(
     let u: Vec<Vector<D>> = (0..cloud.position.len())
         .map(|p| cloud.transfer.displacement(p, asked.displacement))
         .collect();
-    let stress_of = |p: usize| Some(size(asked, tensor, &mean_gradient(model, p, |p| u[p])?));
+    let stress_of = |p: usize| {
+        let at = (model.peridynamic_material(), &cloud.position[p]);
+        Some(size(asked, tensor, at, &mean_gradient(model, p, |p| u[p])?))
+    };
     let points: Vec<u32> = (0..cloud.position.len() as u32).collect();
     model.of_families(ranks, &points, 1, |own| {
         parallel::map(own.len(), 64, |k| stress_of(own[k] as usize).unwrap_or(0.0))
@@ -114,10 +120,15 @@ fn mean_gradient<const D: usize>(
     Some(sum * inverse_moment(model, p)?)
 }
 
-/// The von Mises stress \[Pa\] of a displacement gradient.
-fn size<const D: usize>(asked: &Asked<'_>, tensor: &Tensor4<D>, gradient: &Tensor<D>) -> f64 {
+/// The von Mises stress \[Pa\] of a displacement gradient in a material at a place.
+fn size<const D: usize>(
+    asked: &Asked<'_, D>,
+    tensor: &Tensor4<D>,
+    (material, x): (u16, &Vector<D>),
+    gradient: &Tensor<D>,
+) -> f64 {
     let stress = tensor.contract(&strain(gradient));
-    let across = stress_across(asked.kinematics, tensor, &stress);
+    let across = asked.stresses.across(material, x, &stress, 0.0);
     von_mises(&principal(&stress, across))
 }
 
@@ -131,7 +142,7 @@ fn size<const D: usize>(asked: &Asked<'_>, tensor: &Tensor4<D>, gradient: &Tenso
 fn missed_peak<const D: usize>(
     model: &Model<D>,
     ranks: Option<&dyn Ranks>,
-    asked: &Asked<'_>,
+    asked: &Asked<'_, D>,
     stresses: &[f64],
 ) -> Option<Warning> {
     let cloud = &model.body()?.cloud;
@@ -170,68 +181,116 @@ fn missed_peak<const D: usize>(
     })
 }
 
-/// Warns of the largest stress of a model where it lies in an element of first order within a horizon of points, and its error is more than [`BENT`]: rows of a seam balance a uniform stress, and one that is linear to the order of the elements. The error is taken from the difference
-/// of the element's own strain from a linear fit to those around, as in \[ZienkiewiczZhu1992\].
+/// Warns of large stresses in elements of first order within a horizon of points, where their error is more than [`BENT`] of the largest one: rows of a seam balance a uniform stress, and one that is linear to the order of the elements. The error is taken from the difference
+/// of an element's own strain from a linear fit to those around, as in \[ZienkiewiczZhu1992\].
 ///
 /// Collective where families are spread over processes.
 fn peak_at_seam<const D: usize>(
     model: &Model<D>,
     ranks: Option<&dyn Ranks>,
-    asked: &Asked<'_>,
+    asked: &Asked<'_, D>,
     stresses: &[f64],
 ) -> Option<Warning> {
-    let (mesh, cloud) = (&model.mesh, &model.body()?.cloud);
+    let mesh = &model.mesh;
     let gradient_of = |c: usize| {
         let node = |n: usize| model.node_transfer.displacement(n, asked.displacement);
         fem::displacement_gradient_at_centre(mesh, c, node)
     };
-    let of_cell = |c: usize| size(asked, model.tensor_of_cell(c), &gradient_of(c));
+    let of = |c: usize, gradient: &Tensor<D>| {
+        let at = (model.material_of_cell(c), &mesh.centroid(c));
+        size(asked, model.tensor_of_cell(c), at, gradient)
+    };
     let cells: Vec<usize> = (0..mesh.cell_count())
         .filter(|&c| model.is_element(c) && mesh.embedded.has_strain(c))
         .collect();
-    let of_cells = parallel::map(cells.len(), 64, |k| of_cell(cells[k]));
-    let elements = cells.iter().copied().zip(of_cells);
-    let (cell, largest) = elements.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let place = mesh.centroid(cell);
-    let horizon = model.peridynamics.as_ref()?.horizon.at(&place);
-    let is_near = |x: &Vector<D>| (x - place).norm() < horizon * (1.0 + 1e-9);
-    let mut points = shown(model).map(|p| (cloud.position[p], stresses[p]));
-    if points.clone().any(|(_, stress)| stress > largest) || !points.any(|(x, _)| is_near(&x)) {
-        return None;
-    }
-    let u = |p: usize| cloud.transfer.displacement(p, asked.displacement);
-    let slope = Slopes::new(model).evened_out(cell)?;
-    let points = slope.tellers().filter_map(|teller| match teller {
-        Teller::Element(_) => None,
-        Teller::Point(site) => model.point_of(site).map(|(_, p)| p as u32),
+    let of_cells = parallel::map(cells.len(), 64, |k| {
+        let c = cells[k];
+        of(c, &gradient_of(c))
     });
-    let points: Vec<u32> = points.collect();
-    let of_points = model.of_families(ranks, &points, D * D, |own| {
+    let of_points = shown(model).map(|p| stresses[p]);
+    let largest = of_points
+        .chain(of_cells.iter().copied())
+        .fold(0.0, f64::max);
+    let elements = cells.into_iter().zip(of_cells);
+    let large = elements.filter(|(_, stress)| *stress > LARGE * largest);
+    let large: Vec<(usize, f64)> = beside_points(model, large.collect());
+    let slopes = Slopes::new(model);
+    let slopes: Vec<_> = parallel::map(large.len(), 8, |k| slopes.evened_out(large[k].0));
+    let of_points = mean_gradients(model, ranks, asked, slopes.iter().flatten());
+    let found = large
+        .iter()
+        .zip(&slopes)
+        .filter_map(|(&(cell, own), slope)| {
+            let fitted: Tensor<D> = slope.as_ref()?.value(|teller| match teller {
+                Teller::Element(c) => gradient_of(c),
+                Teller::Point(site) => {
+                    let point = model.point_of(site).map(|(_, p)| p as u32);
+                    point.map_or_else(Tensor::zeros, |p| of_points[&p])
+                }
+            });
+            let fitted = of(cell, &fitted);
+            Some((cell, own, OF_DIFFERENCE * (fitted - own).abs()))
+        });
+    let (cell, own, off) = found.max_by(|a, b| a.2.total_cmp(&b.2))?;
+    (off > BENT * largest).then(|| {
+        let at = mesh.centroid(cell);
+        let place: Vec<String> = at.iter().map(|x| number(*x)).collect();
+        finer(Warning::new(Code::SeamPeak, format!(
+            "strains in elements beside the seam are not linear from one place to the next near ({}), where the stress is {:.0} % of the largest: it may be wrong by {:.0} % of itself; let elements carry what lies within two horizons of this place, or take a smaller horizon and spacing",
+            place.join(", "),
+            100.0 * own / largest,
+            100.0 * off / own
+        )).of(Quantity::Stress, off / own).at(at.as_slice()), model)
+    })
+}
+
+/// Those of some elements, each with a number, that lie within a horizon of a point.
+fn beside_points<const D: usize>(model: &Model<D>, cells: Vec<(usize, f64)>) -> Vec<(usize, f64)> {
+    let (Some(body), Some(peridynamics)) = (model.body(), &model.peridynamics) else {
+        return Vec::new();
+    };
+    let points: Vec<Vector<D>> = shown(model).map(|p| body.cloud.position[p]).collect();
+    let reach = |x: &Vector<D>| peridynamics.horizon.at(x) * (1.0 + 1e-9);
+    let widest = cells.iter().map(|(c, _)| reach(&model.mesh.centroid(*c)));
+    let bins = Bins::new(&points, widest.fold(f64::MIN_POSITIVE, f64::max));
+    let is_near = |(c, _): &(usize, f64)| {
+        let x = model.mesh.centroid(*c);
+        bins.around(&x, reach(&x))
+            .any(|p| (points[p] - x).norm() < reach(&x))
+    };
+    cells.into_iter().filter(is_near).collect()
+}
+
+/// The mean displacement gradients of the families of all points that tell of some slopes, by the point.
+///
+/// Collective where families are spread over processes.
+fn mean_gradients<'s, const D: usize>(
+    model: &Model<D>,
+    ranks: Option<&dyn Ranks>,
+    asked: &Asked<'_, D>,
+    slopes: impl Iterator<Item = &'s Slope>,
+) -> FxHashMap<u32, Tensor<D>> {
+    let Some(cloud) = model.body().map(|body| &body.cloud) else {
+        return FxHashMap::default();
+    };
+    let u = |p: usize| cloud.transfer.displacement(p, asked.displacement);
+    let points = slopes
+        .flat_map(Slope::tellers)
+        .filter_map(|teller| match teller {
+            Teller::Element(_) => None,
+            Teller::Point(site) => model.point_of(site).map(|(_, p)| p as u32),
+        });
+    let mut points: Vec<u32> = points.collect();
+    points.sort_unstable();
+    points.dedup();
+    let found = model.of_families(ranks, &points, D * D, |own| {
         let of = |&p: &u32| mean_gradient(model, p as usize, u).unwrap_or_else(Tensor::zeros);
         own.iter()
             .flat_map(|p| of(p).iter().copied().collect::<Vec<f64>>())
             .collect()
     });
-    let of_points = of_points.chunks_exact(D * D).map(Tensor::from_column_slice);
-    let of_points: FxHashMap<u32, Tensor<D>> = points.iter().copied().zip(of_points).collect();
-    let fitted: Tensor<D> = slope.value(|teller| match teller {
-        Teller::Element(c) => gradient_of(c),
-        Teller::Point(site) => {
-            let point = model.point_of(site).map(|(_, p)| p as u32);
-            point.map_or_else(Tensor::zeros, |p| of_points[&p])
-        }
-    });
-    let fitted = size(asked, model.tensor_of_cell(cell), &fitted);
-    let off = OF_DIFFERENCE * (fitted / largest - 1.0).abs();
-    (off > BENT).then(|| {
-        let at = place;
-        let place: Vec<String> = place.iter().map(|x| number(*x)).collect();
-        finer(Warning::new(Code::SeamPeak, format!(
-            "the largest stress lies in an element beside the seam, at ({}), where strains are not linear from one place to the next: it may be wrong by {:.0} %; let elements carry what lies within two horizons of this place, or take a smaller horizon and spacing",
-            place.join(", "),
-            100.0 * off
-        )).of(Quantity::Stress, off).at(at.as_slice()), model)
-    })
+    let found = found.chunks_exact(D * D).map(Tensor::from_column_slice);
+    points.iter().copied().zip(found).collect()
 }
 
 /// With a remedy: bonds that end on faces where the coupling is by forces, whose rows know of no surface; else half the horizon and spacing, of points on one lattice.
@@ -247,22 +306,6 @@ fn finer<const D: usize>(warning: Warning, model: &Model<D>) -> Warning {
     let horizon = format!("peridynamics.horizon={}", 0.5 * horizon);
     let points = format!("peridynamics.points.lattice.spacing={}", 0.5 * spacing);
     warning.remedy([&horizon, &points])
-}
-
-/// The stress across the plane of a plate.
-fn stress_across<const D: usize>(
-    kinematics: Kinematics,
-    tensor: &Tensor4<D>,
-    stress: &Tensor<D>,
-) -> f64 {
-    match kinematics {
-        // ν = λ/(2 (λ + μ)), and σ_zz = ν (σ_xx + σ_yy)
-        Kinematics::PlaneStrain => {
-            let [axial, lateral] = [tensor.get(0, 0, 0, 0), tensor.get(0, 0, 1, 1)];
-            stress.trace() * lateral / (axial + lateral)
-        }
-        _ => 0.0,
-    }
 }
 
 /// Returns true if a point lies within a horizon of a crack.

@@ -1,7 +1,7 @@
 //! Thermal strain: effect on the sites of a model of a temperature that differs from the stress-free one.
 //!
 //! A body whose temperature is linear in space expands without stress by a displacement that is quadratic: with the rise τ and its gradient g at a place, `u = α (τ r + (g·r) r − ½ g |r|²)`, r from there. Its strain is `α (τ + g·r)` in
-//! all directions. Source: [BoleyWeiner1960], the strain being compatible where the temperature is linear.
+//! all directions. Source: [BoleyWeiner1960], the strain being compatible where the temperature is linear. Where the expansion is a tensor A, `u = τ A r + (g·r) A r − ½ g (r·A r)` has the strain `A (τ + g·r)`.
 //!
 //! The thermal force is the gradient of the energy that is left of the stored one by a displacement under which each part of it (a bond, a family, a piece of a bond at a seam, an element) expands freely about its own
 //! middle, with the rise of both ends of every pair: `α ξ (τ_i + τ_j)/2`, so that the extension of a bond less its thermal part is what stretches it. A part takes no force from a translation, so its forces add up to zero at any
@@ -14,6 +14,7 @@ use rustc_hash::FxHashMap;
 use crate::assembly::{Centre, Counted, Row, RowPart};
 use crate::coupling::semidiscrete::FreeStretch;
 use crate::fem;
+use crate::material::{Axes, Orthotropic};
 use crate::parallel;
 use crate::run::error::RunError;
 use crate::scene::expression::Expression;
@@ -57,12 +58,41 @@ pub struct Thermal<const D: usize> {
     pub temperature: TemperatureField<D>,
     /// The temperature without thermal strain.
     pub reference: f64,
-    /// Expansion per degree of each material within the dimensions of the scene: `(1 + ν) α` in plane strain.
-    pub expansion: Vec<f64>,
+    /// Expansion of each material within the dimensions of the scene.
+    pub expansion: Vec<Expansion<D>>,
+    /// Twice the energy per volume and squared degree of each material that plane strain holds back across its plane and that is free within \[Pa\]; zero otherwise.
+    pub held: Vec<f64>,
     /// Expansion of the solid over that: 1, and 1/(1 + ν) in plane strain.
     pub solid: Vec<f64>,
     /// Half of the distance over which the temperature is differenced.
     pub reach: f64,
+}
+
+/// Expansion of a material per degree within the dimensions of a scene.
+#[derive(Clone, Debug)]
+pub enum Expansion<const D: usize> {
+    /// The same in all directions: α, `(1 + ν) α` in plane strain.
+    Isotropic(f64),
+    /// Along the axes of the material.
+    Orthotropic(Orthotropic<D>, Axes<D>),
+}
+
+impl<const D: usize> Expansion<D> {
+    /// The strain of a rise by one degree; axes are those at `x`.
+    fn at(&self, x: &Vector<D>) -> Tensor<D> {
+        match self {
+            Self::Isotropic(alpha) => Tensor::from_diagonal_element(*alpha),
+            Self::Orthotropic(body, axes) => body.expansion(&axes.at(x)),
+        }
+    }
+
+    /// That of a material that has points, which are isotropic; zero of others.
+    fn of_points(&self) -> f64 {
+        match self {
+            Self::Isotropic(alpha) => *alpha,
+            Self::Orthotropic(..) => 0.0,
+        }
+    }
 }
 
 /// Forces of free expansion as products with the temperature, of the sites whose rows are not those of elements alone.
@@ -115,9 +145,15 @@ impl<const D: usize> Thermal<D> {
         }
     }
 
-    /// The stretch `α ΔT` of a material at a place.
+    /// The stretch `α ΔT` of a material that has points, at a place.
     pub fn stretch_at(&self, x: &Vector<D>, material: u16, t: f64) -> f64 {
-        self.expansion[usize::from(material)] * self.rise_at(x, t)
+        self.expansion[usize::from(material)].of_points() * self.rise_at(x, t)
+    }
+
+    /// Energy per volume \[J/m^D\] of a cell that is held back across its plane and free within, by the temperature at its centroid.
+    pub fn held_energy(&self, model: &Model<D>, c: usize, t: f64) -> f64 {
+        let rise = self.rise_at(&model.mesh.centroid(c), t);
+        0.5 * self.held[usize::from(model.material_of_cell(c))] * rise * rise
     }
 
     /// The stretch of points for bonds that know their temperature.
@@ -134,12 +170,12 @@ impl<const D: usize> Thermal<D> {
     /// Displacement of each node of a cell that expands freely about its centroid; of a node that follows the ends of its edge, the mean of theirs.
     fn expanded_nodes(&self, model: &Model<D>, c: usize, t: f64) -> Vec<Vector<D>> {
         let mesh = &model.mesh;
-        let alpha = self.expansion[model.material_of_cell(c) as usize];
         let middle = mesh.centroid(c);
+        let alpha = self.expansion[model.material_of_cell(c) as usize].at(&middle);
         let here = self.rise(&middle, t);
         let free = |n: u32| {
             let x = mesh.nodes[n as usize];
-            parted(&here, &self.rise(&x, t), &(x - middle)) * alpha
+            parted(&here, &self.rise(&x, t), &(x - middle), &alpha)
         };
         let nodes = mesh.cell(c).iter();
         nodes
@@ -177,7 +213,7 @@ impl<const D: usize> Thermal<D> {
 
     /// Coefficients of the free expansion around `x` in the [`unit_expansions`]; rigid motions are left out.
     pub fn parts(&self, material: u16, x: &Vector<D>, t: f64) -> Vec<f64> {
-        let alpha = self.expansion[usize::from(material)];
+        let alpha = self.expansion[usize::from(material)].of_points();
         let rise = self.rise(x, t);
         let at_origin = rise.value - rise.slope.dot(x);
         let parts = std::iter::once(at_origin).chain(rise.slope.iter().copied());
@@ -236,7 +272,13 @@ impl<const D: usize> Thermal<D> {
             for (&column, block) in part.columns.iter().zip(&part.blocks) {
                 let column = column as usize;
                 let xi = model.sites[column].position - x;
-                *sum += block * parted(&here, &rise[column], &xi) * alpha;
+                *sum += block
+                    * parted(
+                        &here,
+                        &rise[column],
+                        &xi,
+                        &Tensor::from_diagonal_element(alpha),
+                    );
             }
         };
         let (sites, sums) =
@@ -281,7 +323,15 @@ impl<const D: usize> Thermal<D> {
         (start, add): (T, impl Fn(&mut T, &RowPart<D>, f64) + Sync),
     ) -> Result<(Vec<u32>, Vec<T>), RunError> {
         let materials = self.materials_in_rows(model);
-        let alpha = |m: u16| self.expansion[usize::from(m)];
+        let alpha = |m: u16| self.expansion[usize::from(m)].of_points();
+        let is_orthotropic =
+            |m: &u16| matches!(self.expansion[usize::from(*m)], Expansion::Orthotropic(..));
+        if model.body().is_some() && materials.iter().any(is_orthotropic) {
+            return Err(RunError::Later {
+                what: "a temperature in orthotropic elements that share nodes with the zone of points",
+                remedy: "enclose the zone in elements of the material of its points, one cell thick",
+            });
+        }
         let first = materials.first().copied();
         let first = first.unwrap_or_else(|| model.peridynamic_material());
         let of_points = model.peridynamic_material();
@@ -460,11 +510,17 @@ pub fn unit_expansions<const D: usize>(model: &Model<D>) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// The displacement of one place seen from another, `xi` apart, where the body between them expands freely by one per degree.
-fn parted<const D: usize>(here: &Rise<D>, there: &Rise<D>, xi: &Vector<D>) -> Vector<D> {
+/// The displacement of one place seen from another, `xi` apart, where the body between them expands freely by `alpha` per degree.
+fn parted<const D: usize>(
+    here: &Rise<D>,
+    there: &Rise<D>,
+    xi: &Vector<D>,
+    alpha: &Tensor<D>,
+) -> Vector<D> {
     let slope = (here.slope + there.slope) * 0.5;
     let mean = 0.5 * (here.value + there.value);
-    xi * (mean + 0.5 * slope.dot(xi)) - slope * (0.5 * xi.norm_squared())
+    let stretched = alpha * xi;
+    stretched * (mean + 0.5 * slope.dot(xi)) - slope * (0.5 * xi.dot(&stretched))
 }
 
 /// The sites whose rows are those of elements alone that take the force of each node, with the part of it: its own, or those that it follows.

@@ -220,7 +220,7 @@ fn nearly_incompressible<const D: usize>(
     // of plane stress a third at most, since its thickness gives way
     let ratio = |c: usize| {
         let tensor = model.tensor_of_cell(c);
-        let (lambda, mu) = (tensor.get(0, 0, 1, 1), tensor.get(0, 1, 0, 1));
+        let (lambda, mu) = tensor.isotropic_part();
         lambda / (2.0 * (lambda + mu))
     };
     let is_first_order = |c: usize| model.mesh.shapes[c] == model.mesh.shapes[c].linear();

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use rustc_hash::FxHashMap;
 
 use super::RunOptions;
+use super::bonds;
 use super::fields::On;
 use super::fields::columns::arrays;
 use super::fields::place::{Shared, Spot};
@@ -64,6 +65,12 @@ pub(super) fn write_for<const D: usize>(
         PieceFiles::new(&whole).remove()?;
         files.push(whole.clone());
         written = Some(shown);
+        for selection in &output.bonds {
+            let file = path(&format!("{}.vtu", selection.stem("")));
+            let lines = bonds::snapshot(solved, selection, &output.origin);
+            write_vtu(&file, &lines, Compression::Zlib)?;
+            files.push(file);
+        }
     }
     if let Some(observer) = options.observer {
         let shown = written.unwrap_or_else(|| of(Shown::All));

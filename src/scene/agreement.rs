@@ -1,17 +1,89 @@
 //! Agreement of parts of a scene that are right alone: materials with zones, horizons with spacings.
 
+use std::sync::Arc;
+
+use super::elasticity::Elasticity;
 use super::error::SceneError;
 use super::materials::Material;
+use super::orthotropic;
 use super::peridynamics::Peridynamics;
 use super::solve::Solve;
-use super::spec::{CouplingSpec, ElementsSpec, SceneSpec, SolveSpec, ZonesNeeded};
+use super::spec::{CouplingSpec, ElementsSpec, MaterialSpec, SceneSpec, SolveSpec, ZonesNeeded};
 use crate::coupling::truncated::CutBonds;
 use crate::fem::{CellBandError, banded_law, crack_band};
+use crate::material::Axes;
 use crate::mesh::Mesh;
 use crate::model::{PointSource, Zone};
 use crate::observe::report::number;
-use crate::peridynamics::ZeroEnergyControl;
 use crate::peridynamics::failure::Fracture;
+use crate::peridynamics::{Law, ZeroEnergyControl};
+
+/// Refuses axes that are given by position and are none at the centroid of a cell of their material.
+///
+/// # Errors
+/// A [`SceneError`] that names the material and the place.
+pub(crate) fn has_axes<const D: usize>(
+    spec: &SceneSpec,
+    (materials, cell_material): (&[Material<D>], &[u16]),
+    mesh: &Mesh<D>,
+) -> Result<(), SceneError> {
+    for (number, material) in materials.iter().enumerate() {
+        let Elasticity::Orthotropic {
+            axes: axes @ Axes::Field(_),
+            ..
+        } = &material.elasticity
+        else {
+            continue;
+        };
+        let cells = (0..mesh.cell_count()).filter(|&c| usize::from(cell_material[c]) == number);
+        let mut places = cells.map(|c| mesh.centroid(c));
+        let Some(x) = places.find(|x| axes.at(x).iter().any(|a| !a.is_finite())) else {
+            continue;
+        };
+        let typed = spec.materials.get(material.name.as_str());
+        if let Some(MaterialSpec::Orthotropic(m)) = typed {
+            let (key, typed) = match (&m.angle, &m.axis_1) {
+                (Some(angle), _) => ("angle", angle),
+                (None, Some(list)) => ("axis-1", &list[0]),
+                (None, None) => continue,
+            };
+            let place = format!("materials.{}.orthotropic.{key}", material.name);
+            return Err(orthotropic::no_axes(
+                &place,
+                typed,
+                &format!(" at {:?}", x.as_slice()),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses points of a material that has no peridynamic law.
+///
+/// # Errors
+/// A [`SceneError`] that names the material and the place.
+pub(crate) fn has_laws<const D: usize>(
+    spec: &SceneSpec,
+    (materials, cell_material): (&[Material<D>], &[u16]),
+    (mesh, zones): (&Mesh<D>, &[Zone]),
+) -> Result<(), SceneError> {
+    let has_none = |c: usize| materials[usize::from(cell_material[c])].law.is_none();
+    let Some(c) = (0..zones.len()).find(|&c| zones[c] != Zone::Local && has_none(c)) else {
+        return Ok(());
+    };
+    let material = &materials[usize::from(cell_material[c])];
+    let zone = match zones[c] {
+        Zone::Transition => "transition",
+        _ => "nonlocal",
+    };
+    Err(SceneError::conflict(format!(
+        "the {zone} zone holds a cell of the material `{}` at {:?}, and an orthotropic material has no peridynamic law",
+        material.name,
+        mesh.centroid(c).as_slice()
+    ))
+    .label(spec.span_of_material(&material.name), "finite elements only")
+    .help("keep the nonlocal and transition zones within materials that have points, zones.nonlocal, or use coupling = \"local\""))
+}
 
 /// Refuses a law that is not linear where rows at the seam would not balance it: those of splice, blending, balanced and partial stress hold a uniform strain whatever stress the two sides have.
 pub(crate) fn balanced_seam<const D: usize>(
@@ -23,6 +95,9 @@ pub(crate) fn balanced_seam<const D: usize>(
 ) -> Result<(), SceneError> {
     let traits = coupling.traits();
     let material = &materials[peridynamic as usize];
+    let Some(law) = &material.law else {
+        return Ok(());
+    };
     let balances = matches!(coupling, CouplingSpec::Truncated(_))
         || matches!(traits.zones, ZonesNeeded::Everywhere(_));
     // a splice gives both sides the stress of one local law, and of the bonds; partial stress that of the bonds
@@ -30,18 +105,18 @@ pub(crate) fn balanced_seam<const D: usize>(
     let elements = spec.peridynamics.as_ref().and_then(|p| p.elements.as_ref());
     let follows_bonds = elements.is_some_and(|e| *e.get_ref() == ElementsSpec::CauchyBorn);
     let has_one_stress = match coupling {
-        CouplingSpec::Splice(_) => material.law.local_law().is_some() || follows_bonds,
+        CouplingSpec::Splice(_) => law.local_law().is_some() || follows_bonds,
         CouplingSpec::PartialStress(_) => follows_bonds,
         _ => false,
     };
     let agrees = has_one_stress && cell_material.iter().all(is_same);
     // elements are linear, and damage at their edge is found
-    if balances || agrees || material.law.is_linear_until_damaged() {
+    if balances || agrees || law.is_linear_until_damaged() {
         return Ok(());
     }
-    let linear = material.law.linearised();
+    let linear = law.linearised();
     let truncates = linear.is_ordinary() && !linear.has_deviators();
-    let remedy = match (truncates, material.law.local_law()) {
+    let remedy = match (truncates, law.local_law()) {
         (_, Some(_)) if !linear.is_ordinary() => {
             "use coupling = \"truncated\", or coupling = \"splice\" with this material in all cells, or \"nonlocal\""
         }
@@ -58,7 +133,7 @@ pub(crate) fn balanced_seam<const D: usize>(
     Err(SceneError::conflict(format!(
         "the law of the material `{}`, {}, is not linear, finite elements are linear, and coupling `{}` does not balance the stresses of the two",
         material.name,
-        material.law.name(),
+        material.law_name(),
         traits.name
     ))
     .label(spec.span_of_material(&material.name), "of this material")
@@ -84,13 +159,14 @@ pub(crate) fn cut_bonds<const D: usize>(
         .label(named.span(), "cuts bonds")
         .help("let cut-bonds = \"linear\", or leave it out, and keep damage two horizons away from the seam"));
     }
-    if typed.cut_bonds.is_none() || material.law.linearised().is_ordinary() {
+    let is_ordinary = |law: &Arc<dyn Law<D>>| law.linearised().is_ordinary();
+    if typed.cut_bonds.is_none() || (material.law.as_ref()).is_none_or(is_ordinary) {
         return Ok(());
     }
     Err(SceneError::conflict(format!(
         "`coupling.truncated.cut-bonds` is set, and the law of the material `{}`, {}, has no bonds that a seam could cut",
         material.name,
-        material.law.name()
+        material.law_name()
     ))
     .label(named.span(), "families end on the faces of elements")
     .help("remove cut-bonds"))
@@ -104,8 +180,9 @@ pub(crate) fn elastic_elements<const D: usize>(
     zones: &[Zone],
 ) -> Result<(), SceneError> {
     let bends = |m: &Material<D>| {
-        let law = &m.law;
-        !law.is_linear() && !law.linearised().is_ordinary() && law.local_law().is_none()
+        m.law.as_ref().is_some_and(|law| {
+            !law.is_linear() && !law.linearised().is_ordinary() && law.local_law().is_none()
+        })
     };
     let cells = zones.iter().zip(cell_material);
     let local = cells.filter(|(zone, _)| **zone == Zone::Local);
@@ -116,7 +193,7 @@ pub(crate) fn elastic_elements<const D: usize>(
     Err(SceneError::conflict(format!(
         "finite elements of the material `{}` would stay elastic, and its law, {}, is not",
         material.name,
-        material.law.name()
+        material.law_name()
     ))
     .label(spec.span_of_material(&material.name), "of this material")
     .help("use coupling = \"nonlocal\", or give these cells an elastic material of their own"))
@@ -131,7 +208,6 @@ pub(crate) fn crack_bands<const D: usize>(
 ) -> Result<(), SceneError> {
     for (own, material) in materials.iter().enumerate() {
         let Some(law) = material
-            .law
             .local_law()
             .filter(|l| l.history().damage.is_some())
         else {
@@ -183,14 +259,14 @@ fn remembering<'a, const D: usize>(
     zones: &[Zone],
 ) -> Option<&'a Material<D>> {
     let by_points = |m: &Material<D>| {
-        let states = m.law.force_state();
+        let states = m.force_state();
         states.is_some_and(|states| match states.correspondence(None) {
             Some(point) => point.law.history().is_path_dependent,
             None => !states.history().is_empty(),
         })
     };
     let by_elements = |m: &Material<D>| {
-        let law = m.law.local_law();
+        let law = m.local_law();
         law.is_some_and(|law| law.history().is_path_dependent)
     };
     let mut used = zones.iter().zip(cell_material);
@@ -208,7 +284,7 @@ pub(crate) fn memory<const D: usize>(
     cell_material: &[u16],
     zones: &[Zone],
 ) -> Result<(), SceneError> {
-    let solve = spec.solve.as_ref().map(|s| s.get_ref());
+    let solve = spec.analysis();
     let is_static = matches!(solve, None | Some(SolveSpec::Static(_)));
     let follows = spec.zones.follow.as_ref();
     if !is_static && follows.is_none() {
@@ -220,7 +296,7 @@ pub(crate) fn memory<const D: usize>(
     let of = format!(
         "the law of the material `{}`, {}, remembers",
         material.name,
-        material.law.name()
+        material.law_name()
     );
     let refused = |message: String| SceneError::conflict(message);
     Err(match (is_static, follows) {
@@ -246,12 +322,12 @@ pub(crate) fn drag<const D: usize>(
     points: &[u16],
 ) -> Result<(), SceneError> {
     let drags = |m: &&Material<D>| {
-        let states = m.law.force_state();
+        let states = m.force_state();
         let stress = states.and_then(|states| states.correspondence(None));
         stress.is_some_and(|stress| stress.control == ZeroEnergyControl::Drag)
     };
     let mut used = points.iter().map(|m| &materials[usize::from(*m)]);
-    let why = match spec.solve.as_ref().map(|s| s.get_ref()) {
+    let why = match spec.analysis() {
         Some(SolveSpec::Explicit(explicit)) if explicit.sub_steps.is_none() => return Ok(()),
         Some(SolveSpec::Explicit(_)) => "and sub-steps have several",
         _ => "and this scene is at rest in every step",

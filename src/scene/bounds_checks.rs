@@ -15,6 +15,21 @@ pub(crate) fn positive(place: &str, number: &Number) -> Result<f64, SceneError> 
     )
 }
 
+/// The largest modulus, whose square times those of lengths still is a number.
+const STIFFEST: f64 = 1e100;
+
+/// The value, if it is a modulus of elasticity.
+pub(crate) fn modulus(place: &str, number: &Number) -> Result<f64, SceneError> {
+    positive(place, number)?;
+    within(
+        place,
+        number,
+        number.value >= 1.0 / STIFFEST && number.value <= STIFFEST,
+        "too small or too large to be computed with",
+        "choose units in which it lies between 1e-100 and 1e100",
+    )
+}
+
 /// The value, if it is zero or positive.
 pub(crate) fn not_negative(place: &str, number: &Number) -> Result<f64, SceneError> {
     within(

@@ -16,7 +16,9 @@ pub struct Components<const D: usize>(pub [Option<Expression>; D]);
 
 impl PartialEq for Expression {
     fn eq(&self, other: &Self) -> bool {
-        self.text == other.text && self.function() == other.function()
+        self.text == other.text
+            && self.function() == other.function()
+            && self.held() == other.held()
     }
 }
 
@@ -76,6 +78,11 @@ impl<const D: usize> Components<D> {
                 (None, _) => 0.0,
             })
         })
+    }
+
+    /// The same field with the values that it has at the time `t`, at any time.
+    pub(crate) fn held_at(self, t: f64) -> Self {
+        Self(self.0.map(|component| Some(component?.held_at(t))))
     }
 
     /// Returns true if any component changes with time.

@@ -18,19 +18,33 @@ pub(crate) fn conditions<const D: usize>(
     mesh: &Mesh<D>,
     clock: Clock,
 ) -> Result<Vec<Condition<D>>, SceneError> {
-    let mut found = Vec::with_capacity(spec.len());
-    for (name, condition) in spec {
-        let built = condition.build(name, mesh, clock)?;
-        let rests = |term: &dyn ConditionTerm<D>| term.holds_at_rest();
-        if clock.pacing == Pacing::Still && !built.term().is_none_or(rests) {
-            return Err(
-                SceneError::conflict(format!("`conditions.{name}` in a static scene"))
-                    .label(name.span.clone(), "is not linear in the displacement")
-                    .help("add [solve.quasi-static] with steps = 1, or [solve.explicit]"),
-            );
-        }
-        found.push(built);
+    let found = spec.iter().map(|typed| built(typed, mesh, clock));
+    let found = found.collect::<Result<Vec<_>, _>>()?;
+    bear(&found, clock)?;
+    agree(spec, &found, mesh, clock)?;
+    Ok(found)
+}
+
+/// One condition.
+pub(super) fn built<const D: usize>(
+    (name, condition): (&Text, &ConditionSpec),
+    mesh: &Mesh<D>,
+    clock: Clock,
+) -> Result<Condition<D>, SceneError> {
+    let built = condition.build(name, mesh, clock)?;
+    let rests = |term: &dyn ConditionTerm<D>| term.holds_at_rest();
+    if clock.pacing == Pacing::Still && !built.term().is_none_or(rests) {
+        return Err(
+            SceneError::conflict(format!("`conditions.{name}` in a static scene"))
+                .label(name.span.clone(), "is not linear in the displacement")
+                .help("add [solve.quasi-static] with steps = 1, or [solve.explicit]"),
+        );
     }
+    Ok(built)
+}
+
+/// Refuses conditions that hold nothing, where nothing moves.
+pub(super) fn bear<const D: usize>(found: &[Condition<D>], clock: Clock) -> Result<(), SceneError> {
     let holds = |c: &Condition<D>| match &c.prescribed {
         Prescribed::Displacement(_) => true,
         Prescribed::Term(term) => term.holds_at_rest(),
@@ -43,12 +57,11 @@ pub(crate) fn conditions<const D: usize>(
         .label(0..0, "no [conditions.NAME.displacement] in this scene")
         .help("add one, for example [conditions.base.displacement] with on = \"bottom\", y = 0"));
     }
-    agree(spec, &found, mesh, clock)?;
-    Ok(found)
+    Ok(())
 }
 
 /// Refuses two motions of one node that differ.
-fn agree<const D: usize>(
+pub(super) fn agree<const D: usize>(
     spec: &BTreeMap<Text, ConditionSpec>,
     conditions: &[Condition<D>],
     mesh: &Mesh<D>,

@@ -134,11 +134,16 @@ pub(super) fn conduction<const D: usize>(
 fn times(spec: &ConductionSpec, clock: Clock) -> Result<Vec<f64>, SceneError> {
     let end = match clock.pacing {
         Pacing::Loading | Pacing::Moving => clock.end(),
-        Pacing::Still => {
+        Pacing::Still | Pacing::Lasting => {
             let typed = (spec.initial.as_ref().map(|e| ("initial", e.span.clone())))
                 .or_else(|| spec.steps.as_ref().map(|s| ("steps", s.span.clone())));
             return match typed {
                 None => Ok(vec![0.0]),
+                Some((key, span)) if clock.pacing == Pacing::Lasting => Err(SceneError::conflict(
+                    format!("`{PLACE}.{key}` in a scene of several stages"),
+                )
+                .label(span, "each stage has a time of its own")
+                .help("remove it for the steady temperature, which lasts through all stages")),
                 Some((key, span)) => Err(SceneError::conflict(format!("`{PLACE}.{key}` in a static scene"))
                     .label(span, "there is no time")
                     .help("remove it for the steady temperature, or add [solve.quasi-static] with steps and duration")),

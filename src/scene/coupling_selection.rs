@@ -85,11 +85,15 @@ pub(crate) fn selected<const D: usize>(
                 .to_owned(),
         ),
     );
-    if !spec.zones.bodies.is_empty() {
-        // only bonds that end on faces join bodies of different horizons
-        return Ok(truncated);
-    }
     let splice = CouplingSpec::Splice(SpliceSpec {});
+    if !spec.zones.bodies.is_empty() {
+        let why = "the scene names none, and its bodies are spliced".to_owned();
+        return Ok(match p.splices() {
+            true => of(splice, span, Some(why)),
+            // a layer of elements keeps bodies apart
+            false => truncated,
+        });
+    }
     let is_placed = spec.zones.auto.is_some();
     Ok(
         match obstacle(spec, p, (found, cell_material), mesh, &truncated, placed)? {
@@ -139,17 +143,19 @@ fn obstacle<const D: usize>(
 ) -> Result<Option<Obstacle>, SceneError> {
     let certain = |reason: &str| Ok(Some(Obstacle::Certain(reason.to_owned())));
     let follows_bonds = |e: &toml::Spanned<ElementsSpec>| *e.get_ref() == ElementsSpec::CauchyBorn;
-    let is_slow = |m: &Material<D>| !m.is_accelerated();
+    let is_slow = |m: &Material<D>| m.law.is_some() && !m.is_accelerated();
     if p.elements.as_ref().is_some_and(follows_bonds) && found.iter().any(is_slow) {
         return certain("elements that follow the bonds of such a law at any stretch");
     }
     // what the seam or the proof has to tell
     let mut doubt = None;
     for m in found {
-        let (lambda, mu) = m.lame;
-        let law = m.law.linearised();
+        let (Some((lambda, mu)), Some(law)) = (m.lame(), &m.law) else {
+            continue;
+        };
+        let law = law.linearised();
         if law.has_deviators() {
-            return certain(&format!("the {} material `{}`", m.law.name(), m.name));
+            return certain(&format!("the {} material `{}`", m.law_name(), m.name));
         }
         if !law.is_ordinary() {
             doubt = Some(
@@ -174,7 +180,9 @@ fn obstacle<const D: usize>(
     }
     let zones = zones::zones(spec, truncated, mesh, placed)?;
     let used = material_interfaces::materials_of_points(cell_material, &zones);
-    if used.len() > 1 && (D == 3 || !found[usize::from(used[0])].law.linearised().is_pairwise()) {
+    let law = found[usize::from(used[0])].law.as_ref();
+    let is_pairwise = law.is_some_and(|law| law.linearised().is_pairwise());
+    if used.len() > 1 && (D == 3 || !is_pairwise) {
         return certain("points of several materials in space, or of a law with dilatations");
     }
     let lattice = peridynamics::peridynamics(p, truncated.traits.lattice, mesh, &zones)?;

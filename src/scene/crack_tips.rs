@@ -1,6 +1,7 @@
 //! Domains around the tips of cracks over which energy release rates and stress intensity factors are integrated.
 
 use std::ops::RangeInclusive;
+use std::sync::Arc;
 
 use super::conditions::Prescribed;
 use super::error::{SceneError, Span};
@@ -11,6 +12,7 @@ use super::spec::{SceneSpec, TipSpec};
 use super::validated::{Scene, Tip, TipDomains};
 use super::value::Text;
 use crate::fem::Locator;
+use crate::peridynamics::Law;
 use crate::shape::Shape;
 use crate::tensor::Vector;
 
@@ -190,16 +192,23 @@ fn material<const D: usize>(
         .help("turn `direction` to the end that lies in the body"));
     };
     let material = &scene.materials[usize::from(scene.cell_material[located.cell])];
-    let local = material.law.local_law();
-    let is_elastic = material.law.is_linear_until_damaged() && local.is_none_or(|l| l.is_linear());
-    if is_elastic {
-        return Ok(material.lame);
+    let is_elastic = |law: &Arc<dyn Law<D>>| {
+        law.is_linear_until_damaged() && law.local_law().is_none_or(|l| l.is_linear())
+    };
+    if let (Some(lame), true) = (
+        material.lame(),
+        material.law.as_ref().is_some_and(is_elastic),
+    ) {
+        return Ok(lame);
     }
     Err(SceneError::conflict(format!(
-        "`{place}.energy-release`: the material `{}` is not linearly elastic",
+        "`{place}.energy-release`: the material `{}` is not isotropic and linearly elastic",
         material.name
     ))
-    .label(span.clone(), "the integral is one of an elastic body")
+    .label(
+        span.clone(),
+        "the integrals are those of an isotropic elastic body",
+    )
     .help("use `bond-based`, `lps` or `correspondence`"))
 }
 
@@ -236,7 +245,7 @@ fn room<const D: usize>(
     }
     for c in 0..mesh.cell_count() {
         let other = &scene.materials[usize::from(scene.cell_material[c])];
-        if other.lame == lame {
+        if other.lame() == Some(lame) {
             continue;
         }
         let (low, high) = mesh.bounds_of(mesh.corners(c));

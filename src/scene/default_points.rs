@@ -83,6 +83,23 @@ fn of_horizon<const D: usize>(extents: &Vector<D>, horizon: f64) -> f64 {
     least / (RATIO * least / horizon - 1e-9).ceil()
 }
 
+/// The lattice of the centroids of all cells, if these are equal cubes (squares, intervals) of one grid along the axes.
+pub(super) fn of_centroids<const D: usize>(mesh: &Mesh<D>) -> Option<PointSource<D>> {
+    let cells: Vec<usize> = (0..mesh.cell_count()).collect();
+    let (low, high) = mesh.bounds_of(mesh.cell(*cells.first()?));
+    let edges = high - low;
+    let is_cube = edges.max() - edges.min() <= ALIKE * edges.min();
+    let (spacing, corner) = of_cells(mesh, &cells, RATIO * edges.min())?;
+    let is_filled = cells.iter().all(|&c| {
+        let volume = spacing.powi(D as i32);
+        (mesh.cell_volume(c).abs() - volume).abs() <= ALIKE * volume
+    });
+    (is_cube && is_filled).then(|| PointSource::Lattice {
+        spacing,
+        origin: corner.add_scalar(0.5 * spacing),
+    })
+}
+
 /// Spacing and a corner of the grid that the cells are, if they are one whose edges are multiples of a spacing.
 pub(super) fn of_cells<const D: usize>(
     mesh: &Mesh<D>,

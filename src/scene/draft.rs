@@ -12,14 +12,16 @@ use super::conditions::Condition;
 use super::error::SceneError;
 use super::impactors::{self, Impactor};
 use super::initial::Initial;
+use super::load_stage::LoadStage;
 use super::material_interfaces::MaterialInterface;
 use super::materials::{self, Material};
 use super::meshing;
 use super::peridynamics::{self, Peridynamics};
-use super::solve::Solve;
+use super::solve::{Clock, Solve};
 use super::spec::{
     CouplingSpec, ElementsSpec, InfluenceSpec, MaterialSpec, SceneSpec, ZonesNeeded,
 };
+use super::stages::Stages;
 use super::table_rows;
 use super::temperature::{self, Temperature};
 use super::unused::Parts;
@@ -28,7 +30,8 @@ use super::validated::{Scene, Solver};
 use super::zones::Placed;
 use super::{
     adaptive_zone, agreement, coupling_selection, crack_tips, cracks_and_voids, elements, failure,
-    initial, lattice_regions, material_interfaces, output, point_file, solve, zones,
+    horizon_change, initial, lattice_regions, material_interfaces, output, point_file, solve,
+    zones,
 };
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
@@ -48,6 +51,7 @@ pub(crate) struct Draft<'a, const D: usize> {
     pub materials: Vec<Material<D>>,
     pub cell_material: Vec<u16>,
     pub solve: Solve,
+    pub before: Option<LoadStage<D>>,
     pub conditions: Vec<Condition<D>>,
     pub temperature: Option<Temperature<D>>,
     pub initial: Vec<Initial<D>>,
@@ -97,17 +101,21 @@ impl<'a, const D: usize> Draft<'a, D> {
             }
         }
         let is_objective = |m: &Material<D>| {
-            let local = m.law.local_law();
+            let local = m.local_law();
             local.is_some_and(|law| law.is_objective())
         };
         let has_large_strains = materials.iter().any(is_objective);
-        let solve = solve::solve(spec.solve.as_ref(), has_large_strains)?;
+        let solve = match Stages::of(spec)? {
+            None => solve::solve(spec.solve.as_ref(), has_large_strains)?,
+            Some(stages) => stages.motion(has_large_strains)?,
+        };
         let clock = solve.clock();
-        let conditions = condition_list::conditions(&spec.conditions, &mesh, clock)?;
+        let (before, conditions) = conditions(spec, &mesh, &solve)?;
         let initial = initial::initial(&spec.initial, &mesh, clock)?;
         let impactors = impactors::impactors(spec, &solve)?;
         let stuff = (materials.as_slice(), cell_material.as_slice());
-        let temperature = temperature::temperature(spec, &mesh, stuff, clock)?;
+        let temperature = temperature::temperature(spec, &mesh, stuff, of_heat(&before, clock))?;
+        agreement::has_axes(spec, stuff, &mesh)?;
         meshing::add_mesh(&mesh, &mut fingerprint);
         Ok(Self {
             spec,
@@ -116,6 +124,7 @@ impl<'a, const D: usize> Draft<'a, D> {
             materials,
             cell_material,
             solve,
+            before,
             conditions,
             temperature,
             initial,
@@ -138,15 +147,18 @@ impl<'a, const D: usize> Draft<'a, D> {
         lattice: Option<Peridynamics<D>>,
     ) -> Result<Self, SceneError> {
         let (spec, clock) = (self.spec, self.solve.clock());
+        agreement::has_axes(spec, (&self.materials, &cell_material), &mesh)?;
+        let (before, conditions) = conditions(spec, &mesh, &self.solve)?;
         Ok(Self {
             spec,
             kinematics: self.kinematics,
             materials: self.materials.clone(),
             cell_material,
-            conditions: condition_list::conditions(&spec.conditions, &mesh, clock)?,
             temperature: (self.temperature.as_ref())
-                .map(|t| t.on_mesh(&mesh, clock))
+                .map(|t| t.on_mesh(&mesh, of_heat(&before, clock)))
                 .transpose()?,
+            before,
+            conditions,
             initial: initial::initial(&spec.initial, &mesh, clock)?,
             impactors: self.impactors.clone(),
             solve: self.solve.clone(),
@@ -255,7 +267,7 @@ impl<'a, const D: usize> Draft<'a, D> {
         &self,
         coupling: &CouplingSpec,
         used: &[u16],
-        law: &dyn Law<D>,
+        law: Option<&dyn Law<D>>,
         bonds: BondKinematics,
     ) -> Result<ElementsSpec, SceneError> {
         elements::elements(self.spec, coupling, (&self.materials, used), law, bonds)
@@ -293,27 +305,30 @@ impl<'a, const D: usize> Draft<'a, D> {
             (None, None) => None,
             (None, Some(p)) => Some(peridynamics::peridynamics(p, traits.lattice, mesh, &zones)?),
         };
+        agreement::has_laws(spec, materials, (mesh, zones.as_slice()))?;
         let choices: Vec<Decision> = peridynamics.iter().flat_map(lattice_choices).collect();
         let peridynamics = peridynamics
-            .map(|p| lattice_regions::bodies(spec, traits, p, mesh, &mut zones))
+            .map(|p| {
+                let p = horizon_change::with_rule(spec, traits, p)?;
+                lattice_regions::bodies(spec, traits, p, mesh, &mut zones)
+            })
             .transpose()?;
         let points = self.point_materials(&selected.coupling, peridynamics.as_ref(), &zones)?;
-        let (used, law, told) = (points.used, points.law, points.told);
+        let (used, law) = (points.used, points.law);
+        horizon_change::check_law(spec, peridynamics.as_ref(), law.as_deref())?;
         self.check_horizon(peridynamics.as_ref(), &used, &zones)?;
         let (voids, barriers) = cracks_and_voids::obstacles(spec, mesh, &zones)?;
-        if matches!(self.solve, Solve::Explicit(_)) {
-            densities(spec, &self.materials)?;
-        }
+        densities(spec, &self.materials, &self.solve)?;
         self.check_laws(&selected.coupling, &used, &zones)?;
         let breaking = failure::breaking(spec, &self.materials, &used, points.interfaces, mesh)?;
-        let elements = self.elements(&selected.coupling, &used, law.as_ref(), breaking.bonds)?;
+        let elements = self.elements(&selected.coupling, &used, law.as_deref(), breaking.bonds)?;
         self.check_heat(&selected.coupling, elements)?;
         let follow = adaptive_zone::follow(
             spec,
             &mut selected,
             &self.solve,
             &breaking,
-            (peridynamics.as_ref()).map(|p| (p, law.as_ref())),
+            peridynamics.as_ref().zip(law.as_deref()),
             mesh,
             |c| self.cell_material[c] == used[0],
         )?;
@@ -332,7 +347,8 @@ impl<'a, const D: usize> Draft<'a, D> {
             coupling: selected.coupling,
             coupling_why: selected.why,
             placement: None,
-            choices: choices.into_iter().chain(told).collect(),
+            choices: choices.into_iter().chain(points.told).collect(),
+            before: self.before.clone(),
             conditions: self.conditions.clone(),
             temperature: self.temperature.clone(),
             voids,
@@ -355,11 +371,40 @@ impl<'a, const D: usize> Draft<'a, D> {
     }
 }
 
+/// Supports and loads of a scene, on a mesh: of one in stages those of the load steps before, and those of the motion.
+///
+/// # Errors
+/// A [`SceneError`] with place, value and remedy.
+fn conditions<const D: usize>(
+    spec: &SceneSpec,
+    mesh: &Mesh<D>,
+    solve: &Solve,
+) -> Result<(Option<LoadStage<D>>, Vec<Condition<D>>), SceneError> {
+    match Stages::of(spec)? {
+        None => Ok((
+            None,
+            condition_list::conditions(&spec.conditions, mesh, solve.clock())?,
+        )),
+        Some(stages) => {
+            let (before, conditions) = stages.conditions(&spec.conditions, mesh, solve)?;
+            Ok((Some(before), conditions))
+        }
+    }
+}
+
+/// The clock of the temperature, which lasts through all stages.
+fn of_heat<const D: usize>(before: &Option<LoadStage<D>>, clock: Clock) -> Clock {
+    match before {
+        None => clock,
+        Some(_) => Clock::lasting(),
+    }
+}
+
 /// Materials and law of the points.
 struct PointMaterials<const D: usize> {
     /// Their materials.
     used: Vec<u16>,
-    law: Arc<dyn Law<D>>,
+    law: Option<Arc<dyn Law<D>>>,
     interfaces: Vec<MaterialInterface>,
     /// The decision that names them, if there are several.
     told: Option<Decision>,
@@ -397,8 +442,13 @@ fn points_choice<const D: usize>(p: &Peridynamics<D>) -> Option<Decision> {
 }
 
 /// Refuses a motion without inertia.
-fn densities<const D: usize>(spec: &SceneSpec, found: &[Material<D>]) -> Result<(), SceneError> {
-    let Some(light) = found.iter().find(|m| m.density <= 0.0) else {
+fn densities<const D: usize>(
+    spec: &SceneSpec,
+    found: &[Material<D>],
+    solve: &Solve,
+) -> Result<(), SceneError> {
+    let light = found.iter().find(|m| m.density <= 0.0);
+    let Some(light) = light.filter(|_| matches!(solve, Solve::Explicit(_))) else {
         return Ok(());
     };
     let span = spec.span_of_material(&light.name);

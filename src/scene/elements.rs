@@ -16,12 +16,19 @@ pub(crate) fn elements<const D: usize>(
     spec: &SceneSpec,
     coupling: &CouplingSpec,
     (materials, used): (&[Material<D>], &[u16]),
-    law: &dyn Law<D>,
+    law: Option<&dyn Law<D>>,
     bonds: BondKinematics,
 ) -> Result<ElementsSpec, SceneError> {
     let typed = spec.peridynamics.as_ref().and_then(|p| p.elements.as_ref());
     let Some(typed) = typed.filter(|typed| *typed.get_ref() == ElementsSpec::CauchyBorn) else {
         return Ok(ElementsSpec::Linear);
+    };
+    let Some(law) = law else {
+        return Err(SceneError::conflict(
+            "`peridynamics.elements` is \"cauchy-born\", and no material has points whose bonds the elements could follow",
+        )
+        .label(typed.span(), "of which bonds?")
+        .help("remove this"));
     };
     let accelerated = used
         .iter()
@@ -81,11 +88,11 @@ fn law_without_stress<const D: usize>(
     bonds: BondKinematics,
 ) -> Obstacle {
     let mut own = used.iter().map(|&m| &materials[usize::from(m)]);
-    if let Some(own) = own.find(|m| m.law.local_law().is_some()) {
+    if let Some(own) = own.find(|m| m.local_law().is_some()) {
         let why = format!(
             "elements of the material `{}` already have the local law of its points, {}",
             own.name,
-            own.law.name()
+            own.law_name()
         );
         return Some((why, "remove this"));
     }

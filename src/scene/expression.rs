@@ -38,6 +38,8 @@ pub struct Expression {
     root: Term,
     /// The tables that it may name.
     tables: Vec<Table>,
+    /// The time at which it is evaluated whatever the time is; none if it follows the time.
+    held_at: Option<f64>,
 }
 
 impl fmt::Debug for Expression {
@@ -164,6 +166,7 @@ impl Expression {
             span: Span::default(),
             root,
             tables: tables.to_vec(),
+            held_at: None,
         })
     }
 
@@ -174,6 +177,7 @@ impl Expression {
             span: Span::default(),
             root: Term::Constant(value),
             tables: Vec::new(),
+            held_at: None,
         }
     }
 
@@ -184,6 +188,7 @@ impl Expression {
             span: Span::default(),
             root: Term::Function(function),
             tables: Vec::new(),
+            held_at: None,
         }
     }
 
@@ -202,10 +207,23 @@ impl Expression {
 
     /// The values at some positions (components beyond the dimension are zero) at the time `t`.
     pub fn values_at(&self, places: &[[f64; 3]], t: f64) -> Vec<f64> {
+        let t = self.held_at.unwrap_or(t);
         match &self.root {
             Term::Function(function) => function.values(places, t),
             _ => places.iter().map(|x| self.eval_at(x, t)).collect(),
         }
+    }
+
+    /// The time at which it is held, if it is.
+    pub(crate) fn held(&self) -> Option<f64> {
+        self.held_at
+    }
+
+    /// The same expression with the values that it has at the time `t`, at any time.
+    pub(crate) fn held_at(mut self, t: f64) -> Self {
+        // the first to hold it holds it for good
+        self.held_at.get_or_insert(t);
+        self
     }
 
     /// The same expression, found at `span`.
@@ -221,7 +239,8 @@ impl Expression {
 
     /// The value at the position `x` (components beyond the dimension are zero) and the time `t`.
     pub fn eval_at(&self, x: &[f64; 3], t: f64) -> f64 {
-        self.root.eval(&[x[0], x[1], x[2], t])
+        self.root
+            .eval(&[x[0], x[1], x[2], self.held_at.unwrap_or(t)])
     }
 
     /// The value, if the expression has no variable and no table.
@@ -242,7 +261,7 @@ impl Expression {
 
     /// Returns true if the variable of `axis` (0 for `x`, 1 for `y`, 2 for `z`, 3 for `t`) appears.
     pub fn depends_on(&self, axis: usize) -> bool {
-        self.root.depends_on(axis)
+        !(axis == TIME && self.held_at.is_some()) && self.root.depends_on(axis)
     }
 }
 

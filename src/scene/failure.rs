@@ -5,7 +5,10 @@ use super::error::SceneError;
 use super::material_interfaces::MaterialInterface;
 use super::materials::Material;
 use super::region::{Region, region};
-use super::spec::{CalibrationSpec, ContactSpec, EdgeSpec, SceneSpec, SolveSpec};
+use super::spec::{
+    CalibrationSpec, ContactSpec, EdgeSpec, HorizonChangeSpec, PeridynamicsSpec, SceneSpec,
+    SolveSpec,
+};
 use super::value::Number;
 use crate::coupling::semidiscrete::behaviour::ContactBehaviour;
 use crate::mesh::Mesh;
@@ -103,14 +106,14 @@ fn bonds_of<const D: usize>(
     is_static: bool,
 ) -> Result<BondKinematics, SceneError> {
     let typed = spec.peridynamics.as_ref().and_then(|p| p.bonds.as_ref());
-    let is_objective = (material.law.force_state()).is_some_and(|f| f.is_objective());
+    let is_objective = material.force_state().is_some_and(|f| f.is_objective());
     Ok(match typed {
         Some(bonds) => {
             if *bonds.get_ref() == BondKinematics::Exact && !is_objective {
                 return Err(SceneError::conflict(format!(
                     "`peridynamics.bonds` is \"exact\", and the material `{}` is a {} law",
                     material.name,
-                    material.law.name()
+                    material.law_name()
                 ))
                 .label(
                     bonds.span(),
@@ -186,6 +189,12 @@ fn softening_of<const D: usize>(
         return Ok(SofteningChoice::AtOnce);
     };
     let weights = spec.peridynamics.as_ref().map(|p| p.weights);
+    let is_dual = |p: &PeridynamicsSpec| {
+        let typed = p.horizon_change.as_ref().map(|typed| *typed.get_ref());
+        p.horizon_varies() && typed.is_none_or(|rule| rule == HorizonChangeSpec::Dual)
+    };
+    let is_dual_solid = spec.peridynamics.as_ref().is_some_and(is_dual)
+        && (material.law.as_ref()).is_some_and(|law| !law.linearised().is_pairwise());
     let reasons = [
         (used.len() > 1, "points have several materials"),
         (
@@ -196,6 +205,10 @@ fn softening_of<const D: usize>(
         (
             weights == Some(BondWeights::Fitted),
             "their weights are fitted, and differ between their ends",
+        ),
+        (
+            is_dual_solid,
+            "horizons change by the rule \"dual\", and those of an lps differ between their ends",
         ),
     ];
     let against = reasons
@@ -216,6 +229,7 @@ fn softening_of<const D: usize>(
             .label(name.map_or(0..0, |name| name.span.clone()), "softens")
             .help("type softening = 1, for bonds that break at once"));
     }
+    // a motion after load steps begins with bonds as these have left them
     let solve = spec.solve.as_ref().map(|s| s.get_ref());
     let in_time = matches!(solve, Some(SolveSpec::Explicit(_)));
     Ok(SofteningChoice::Soften(BondSoftening {
@@ -255,7 +269,7 @@ pub(crate) fn breaking<const D: usize>(
         .label(typed.span(), "of what?")
         .help("give the material a fracture-energy, or remove this"));
     }
-    let solve = spec.solve.as_ref().map(|s| s.get_ref());
+    let solve = spec.analysis();
     let is_static = matches!(solve, None | Some(SolveSpec::Static(_)));
     let bonds = bonds_of(spec, material, breaks, is_static)?;
     let mut no_fail = Vec::with_capacity(spec.no_fail.len());
@@ -288,7 +302,7 @@ pub(crate) fn breaking<const D: usize>(
             used: used.to_vec(),
             interfaces,
         }),
-        damages: material.law.damages(),
+        damages: material.law.as_ref().is_some_and(|law| law.damages()),
         softening: softening_of(spec, materials, used)?,
         calibration: calibration.map_or(CalibrationSpec::Lattice, |c| *c.get_ref()),
         no_fail,

@@ -8,7 +8,7 @@ use super::region;
 use super::spec::{BodySpec, CouplingTraits, LatticeStart, SceneSpec};
 use super::value::Text;
 use crate::mesh::Mesh;
-use crate::model::{Lattice, PointSource, Zone};
+use crate::model::{HorizonChange, Lattice, PointSource, Zone};
 
 /// The cells, the spacing and the horizon of a body.
 fn body_region<const D: usize>(
@@ -67,13 +67,14 @@ pub(crate) fn bodies<const D: usize>(
     let Some(first) = spec.zones.bodies.keys().next() else {
         return Ok(p);
     };
-    if traits.lattice != LatticeStart::Halfway {
+    let splices = p.horizon_change == HorizonChange::Splice;
+    if traits.lattice != LatticeStart::Halfway && !splices {
         return Err(SceneError::conflict(format!(
-            "`zones.bodies` needs bonds that end on faces; coupling `{}` completes families across a seam",
+            "`zones.bodies` is for the couplings `truncated`, `splice` and `nonlocal`; this is `{}`",
             traits.name
         ))
         .label(first.span.clone(), "has a horizon of its own")
-        .help("use coupling = \"truncated\", or a horizon in x, y, z"));
+        .help("use one of these, or a horizon in x, y, z"));
     }
     let (PointSource::Lattice { spacing, origin }, Some(horizon)) =
         (&p.points, p.horizon.as_constant())
@@ -89,6 +90,9 @@ pub(crate) fn bodies<const D: usize>(
         origin: *origin,
         horizon,
     }];
+    // bodies that are spliced start at the same part of their spacing as the rest does
+    let corner = mesh.bounds().0;
+    let part = ((origin - corner) / *spacing).map(|k| k - k.floor());
     let mut of_cell = vec![0u16; mesh.cell_count()];
     for (name, body) in &spec.zones.bodies {
         let place = format!("zones.bodies.{name}");
@@ -107,11 +111,16 @@ pub(crate) fn bodies<const D: usize>(
         }
         lattices.push(Lattice {
             spacing,
-            origin: mesh.bounds().0.add_scalar(0.5 * spacing),
+            origin: match traits.lattice {
+                LatticeStart::Halfway => mesh.bounds().0.add_scalar(0.5 * spacing),
+                LatticeStart::OnCorner => corner + part * spacing,
+            },
             horizon,
         });
     }
-    add_layers(mesh, zones, &of_cell);
+    if !splices {
+        add_layers(mesh, zones, &of_cell);
+    }
     refuse_empty_zones(spec, first, mesh, zones, &of_cell)?;
     Ok(Peridynamics {
         points: PointSource::Lattices { lattices, of_cell },

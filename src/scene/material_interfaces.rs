@@ -94,7 +94,18 @@ fn interface<const D: usize>(
         .label(second.span.clone(), "the same material")
         .help("name two different ones"));
     }
-    let law = &materials[usize::from(a)].law;
+    let law_of = |m: u16| {
+        let material = &materials[usize::from(m)];
+        material.law.as_ref().ok_or_else(|| {
+            SceneError::conflict(format!(
+                "`interfaces.{name}.between` names the material `{}`, which has no points",
+                material.name
+            ))
+            .label(name.span.clone(), "has no bonds")
+            .help("an orthotropic material has finite elements alone, which share their nodes; remove the interface")
+        })
+    };
+    let (law, _) = (law_of(a)?, law_of(b)?);
     if let Some(stiffness) = typed
         .stiffness
         .as_ref()
@@ -186,7 +197,7 @@ pub(crate) fn materials_of_points(cell_material: &[u16], zones: &[Zone]) -> Vec<
     used
 }
 
-/// The law of the points, of all their materials.
+/// The law of the points, of all their materials; none of a material that has no points, in a scene without any.
 ///
 /// # Errors
 /// A [`SceneError`] for materials that cannot have bonds with each other.
@@ -195,15 +206,18 @@ pub(crate) fn law_of_points<const D: usize>(
     materials: &[Material<D>],
     used: &[u16],
     interfaces: &[MaterialInterface],
-) -> Result<Arc<dyn Law<D>>, SceneError> {
-    if let [only] = used {
-        return Ok(Arc::clone(&materials[usize::from(*only)].law));
-    }
-    let laws = materials.iter().map(|m| Arc::clone(&m.law)).collect();
+) -> Result<Option<Arc<dyn Law<D>>>, SceneError> {
+    let first = &materials[usize::from(used[0])].law;
+    let (Some(first), [_, _, ..]) = (first, used) else {
+        return Ok(first.clone());
+    };
+    // a material without points is never asked for its law
+    let law = |m: &Material<D>| Arc::clone(m.law.as_ref().unwrap_or(first));
+    let laws = materials.iter().map(law).collect();
     let mean =
         |a, b| MaterialInterface::of(interfaces, a, b).map_or_else(Default::default, |i| i.mean);
     match Several::new(laws, used, mean) {
-        Ok(law) => Ok(Arc::new(law)),
+        Ok(law) => Ok(Some(Arc::new(law))),
         Err(no) => {
             let (a, b) = (
                 &materials[usize::from(no.first)],
@@ -212,9 +226,9 @@ pub(crate) fn law_of_points<const D: usize>(
             Err(SceneError::conflict(format!(
                 "the materials `{}` ({}) and `{}` ({}) both have points: {}",
                 a.name,
-                a.law.name(),
+                a.law_name(),
                 b.name,
-                b.law.name(),
+                b.law_name(),
                 no.why
             ))
             .label(spec.span_of_material(&a.name), "one")
@@ -243,7 +257,9 @@ pub(crate) fn choice<const D: usize>(
         counted.map(|i| format!("`{}`", i.name)).collect()
     };
     let arithmetic = list(&|i| i.mean == StiffnessMean::Arithmetic);
-    let mut why = match (of(&used[0]).law.linearised().is_pairwise(), &arithmetic[..]) {
+    let is_pairwise = |law: &Arc<dyn Law<D>>| law.linearised().is_pairwise();
+    let is_pairwise = of(&used[0]).law.as_ref().is_some_and(is_pairwise);
+    let mut why = match (is_pairwise, &arithmetic[..]) {
         (false, _) => "bonds between two have half of their stiffness from either end".to_owned(),
         (true, []) => "bonds between two have the harmonic mean of their stiffnesses".to_owned(),
         (true, list) => format!(
@@ -307,7 +323,9 @@ impl<const D: usize> Pair<'_, D> {
 
     /// Refuses couplings whose rows know of one material.
     fn check_coupling(&self, coupling: &CouplingSpec) -> Result<(), SceneError> {
-        let law = &self.materials[0].law;
+        let Some(law) = &self.materials[0].law else {
+            return Ok(());
+        };
         match coupling {
             CouplingSpec::Nonlocal(_) | CouplingSpec::Local(_) | CouplingSpec::Splice(_) => Ok(()),
             CouplingSpec::Truncated(_) if D == 3 => Err(self.refused(

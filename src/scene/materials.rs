@@ -4,19 +4,25 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use rustc_hash::FxHashMap;
+
 use super::bounds_checks;
+use super::elasticity::Elasticity;
 use super::error::SceneError;
+use super::orthotropic;
 use super::peridynamics;
 use super::region::region;
+use super::spec::named_law::NamedSpec;
 use super::spec::{CellsSpec, Given, MaterialSpec, MicromodulusSpec, ShapeSpec};
 use super::user_material;
 use super::value::{Number, Text};
-use crate::material::{Elastic, Kinematics};
+use crate::material::{Axes, Elastic, Kinematics, LocalLaw};
 use crate::mesh::Mesh;
+use crate::model::ElasticCells;
 use crate::peridynamics::failure::{FRACTURE_ENERGY, Fracture};
 use crate::peridynamics::laws::{Constants, Parameter, SOFTENING};
-use crate::peridynamics::{Influence, Law, Micromodulus};
-use crate::tensor::Tensor4;
+use crate::peridynamics::{ForceState, Influence, Law, Micromodulus};
+use crate::tensor::{Tensor, Tensor4, Vector};
 
 /// The Poisson ratio of a material, and that at which its bonds would act alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,15 +52,15 @@ impl Ratio {
 pub struct Material<const D: usize> {
     /// Its name.
     pub name: String,
-    /// The law of its bonds.
-    pub law: Arc<dyn Law<D>>,
-    /// Lamé's parameters (λ_D, μ) of the scene's dimension \[Pa\].
-    pub lame: (f64, f64),
+    /// The law of its bonds; none of a material that only finite elements have.
+    pub law: Option<Arc<dyn Law<D>>>,
+    /// Its linear elasticity.
+    pub elasticity: Elasticity<D>,
     /// Density [kg/m³]; zero if not given.
     pub density: f64,
     /// Fracture criterion of its bonds, if there is one.
     pub fracture: Option<Fracture>,
-    /// Linear thermal expansion per degree; none if not given.
+    /// Linear thermal expansion per degree, of an orthotropic material along axis 1; none if not given.
     pub expansion: Option<f64>,
     /// Thermal conductivity [W/(m K)]; none if not given.
     pub conductivity: Option<f64>,
@@ -65,17 +71,72 @@ pub struct Material<const D: usize> {
 impl<const D: usize> Material<D> {
     /// Returns true if its bonds may break, by a fracture criterion or by their damage.
     pub fn breaks(&self) -> bool {
-        self.fracture.is_some() || self.law.damages()
+        self.fracture.is_some() || self.law.as_ref().is_some_and(|law| law.damages())
     }
 
     /// Returns true if passes over its bonds are accelerated: by the law, and by a criterion of failure that is a stretch.
     pub fn is_accelerated(&self) -> bool {
-        self.law.accelerator().is_some() && self.fracture.is_none_or(Fracture::is_of_stretch)
+        let accelerator = self.law.as_ref().and_then(|law| law.accelerator());
+        accelerator.is_some() && self.fracture.is_none_or(Fracture::is_of_stretch)
     }
 
-    /// The local stiffness \[Pa\].
+    /// The name of its law.
+    pub fn law_name(&self) -> &'static str {
+        (self.law.as_ref()).map_or("orthotropic elasticity", |law| law.name())
+    }
+
+    /// The nonlinear response of its points, if it has any.
+    pub fn force_state(&self) -> Option<&dyn ForceState<D>> {
+        self.law.as_ref()?.force_state()
+    }
+
+    /// The local law that its finite elements have, if they are not linear with its stiffness.
+    pub fn local_law(&self) -> Option<Arc<dyn LocalLaw<D>>> {
+        self.law.as_ref()?.local_law()
+    }
+
+    /// Lamé's parameters (λ_D, μ) \[Pa\]; none of an orthotropic material.
+    pub fn lame(&self) -> Option<(f64, f64)> {
+        match self.elasticity {
+            Elasticity::Isotropic { lambda, shear } => Some((lambda, shear)),
+            Elasticity::Orthotropic { .. } => None,
+        }
+    }
+
+    /// The local stiffness \[Pa\]; of a material whose axes turn from place to place, that in its own axes.
     pub fn stiffness(&self) -> Tensor4<D> {
-        Tensor4::isotropic(self.lame.0, self.lame.1)
+        match &self.elasticity {
+            Elasticity::Orthotropic {
+                body,
+                axes: Axes::Field(_),
+            } => body.stiffness(&Tensor::identity()),
+            elasticity => elasticity.stiffness_at(&Vector::zeros()),
+        }
+    }
+}
+
+/// The elastic constants of cells of some materials; points have the material `of_points`.
+pub(crate) fn elastic_cells<const D: usize>(
+    materials: &[Material<D>],
+    cell_material: Vec<u16>,
+    of_points: u16,
+    mesh: &Mesh<D>,
+) -> ElasticCells<D> {
+    let turns: Vec<bool> = materials.iter().map(|m| m.elasticity.turns()).collect();
+    let mut turned = FxHashMap::default();
+    if turns.contains(&true) {
+        let of = |c: &u32| usize::from(cell_material[*c as usize]);
+        let cells = (0..mesh.cell_count() as u32).filter(|c| turns[of(c)]);
+        turned.extend(cells.map(|c| {
+            let x = mesh.centroid(c as usize);
+            (c, materials[of(&c)].elasticity.stiffness_at(&x))
+        }));
+    }
+    ElasticCells {
+        tensors: materials.iter().map(Material::stiffness).collect(),
+        material: cell_material,
+        of_points,
+        turned,
     }
 }
 
@@ -99,26 +160,27 @@ pub(crate) fn materials<const D: usize>(
     let mut rest: Option<(&Text, u16)> = None;
     for (number, (name, material)) in spec.iter().enumerate() {
         let number = number as u16;
-        let (lame, density) = constants::<D>(name, material, kinematics)?;
-        let (law, cells) = law_and_cells(
-            name,
-            material,
-            (influence, kinematics),
-            (lame, density),
-            directory,
-        )?;
+        let density = match material.density() {
+            Some(d) => {
+                let place = format!("materials.{name}.{}.density", material.law());
+                bounds_checks::not_negative(&place, d)?
+            }
+            None => 0.0,
+        };
+        let (elasticity, law) =
+            elasticity_and_law(name, material, (influence, kinematics), density, directory)?;
         let [conductivity, heat_capacity] = conduction(name, material)?;
         found.push(Material {
             name: name.value.clone(),
             law,
-            lame,
+            elasticity,
             density,
             fracture: fracture(name, material)?,
             expansion: material.thermal_expansion().map(|alpha| alpha.value),
             conductivity,
             heat_capacity,
         });
-        match (cells, rest) {
+        match (material.cells(), rest) {
             (Some(cells), _) => {
                 for c in cells_of(name, cells, mesh)? {
                     if let Some(other) = owner[c].replace(number) {
@@ -196,24 +258,39 @@ fn cells_of<const D: usize>(
     }
 }
 
-fn law_and_cells<'a, const D: usize>(
+/// Elasticity and law of a material.
+fn elasticity_and_law<const D: usize>(
     name: &Text,
-    spec: &'a MaterialSpec,
+    spec: &MaterialSpec,
     (influence, kinematics): (Influence, Kinematics),
-    ((lambda, mu), density): ((f64, f64), f64),
+    density: f64,
     directory: &Path,
-) -> Result<(Arc<dyn Law<D>>, Option<&'a CellsSpec>), SceneError> {
-    let micromodulus = match spec {
-        MaterialSpec::Named(m) => m.micromodulus.as_ref(),
-        MaterialSpec::Umat(_) => None,
+) -> Result<(Elasticity<D>, Option<Arc<dyn Law<D>>>), SceneError> {
+    let (moduli, micromodulus) = match spec {
+        MaterialSpec::Orthotropic(m) => {
+            return Ok((orthotropic::elasticity(name, m, kinematics)?, None));
+        }
+        MaterialSpec::Named(m) => (
+            (&m.youngs_modulus, m.poisson_ratio.as_ref()),
+            m.micromodulus.as_ref(),
+        ),
+        MaterialSpec::Umat(m) => ((&m.youngs_modulus, Some(&m.poisson_ratio)), None),
     };
+    let (lambda, shear) = lame::<D>((name, spec.law()), moduli, kinematics)?;
     let constants = Constants {
         lambda,
-        shear: mu,
+        shear,
         influence,
         micromodulus: match micromodulus {
             None | Some(MicromodulusSpec::InverseDistance) => Micromodulus::InverseDistance,
-            Some(MicromodulusSpec::Constant) => Micromodulus::Constant,
+            Some(MicromodulusSpec::InvertedTriangular) => Micromodulus::Constant,
+            Some(MicromodulusSpec::Constant) => {
+                return Err(SceneError::wrong_value(format!(
+                    "`materials.{name}.bond-based.micromodulus` is \"constant\", which means either of two"
+                ))
+                .label(name.span.clone(), "has this micromodulus")
+                .help("use \"inverse-distance\" for a force c s of the stretch s, the constant micromodulus of Bobaru et al. (2009) and the default; or \"inverted-triangular\" for a force c |ξ| s, which \"constant\" stood for before"));
+            }
             Some(MicromodulusSpec::Uniform) => Micromodulus::Uniform,
             Some(MicromodulusSpec::Triangular) => Micromodulus::Triangular,
             Some(MicromodulusSpec::Influence(i)) => {
@@ -225,37 +302,39 @@ fn law_and_cells<'a, const D: usize>(
         density,
         is_heated: spec.thermal_expansion().is_some(),
     };
-    Ok(match spec {
-        MaterialSpec::Umat(m) => (
-            user_material::umat(name, m, constants, directory)?,
-            m.cells.as_ref(),
-        ),
-        MaterialSpec::Named(m) => {
-            let known = m.law.kinematics();
-            if !known.contains(&kinematics) {
-                let others: Vec<&str> = known.iter().map(|k| k.name()).collect();
-                return Err(SceneError::conflict(format!(
-                    "the law `{}` of the material `{name}` does not hold for kinematics = \"{}\"",
-                    m.law.key(),
-                    kinematics.name()
-                ))
-                .label(
-                    name.span.clone(),
-                    "its stress out of the plane is not known",
-                )
-                .help(format!("it holds for {}", others.join(", "))));
-            }
-            let values = named_values(name, m)?;
-            (m.law.build(constants, &values), m.cells.as_ref())
-        }
-    })
+    let law = match spec {
+        MaterialSpec::Umat(m) => Some(user_material::umat(name, m, constants, directory)?),
+        MaterialSpec::Named(m) => Some(named_law(name, m, constants)?),
+        MaterialSpec::Orthotropic(_) => None,
+    };
+    Ok((Elasticity::Isotropic { lambda, shear }, law))
+}
+
+/// The law that is known by its key.
+fn named_law<const D: usize>(
+    name: &Text,
+    m: &NamedSpec,
+    constants: Constants,
+) -> Result<Arc<dyn Law<D>>, SceneError> {
+    let (known, kinematics) = (m.law.kinematics(), constants.kinematics);
+    if !known.contains(&kinematics) {
+        let others: Vec<&str> = known.iter().map(|k| k.name()).collect();
+        return Err(SceneError::conflict(format!(
+            "the law `{}` of the material `{name}` does not hold for kinematics = \"{}\"",
+            m.law.key(),
+            kinematics.name()
+        ))
+        .label(
+            name.span.clone(),
+            "its stress out of the plane is not known",
+        )
+        .help(format!("it holds for {}", others.join(", "))));
+    }
+    Ok(m.law.build(constants, &named_values(name, m)?))
 }
 
 /// The numbers of a law that is known by its key.
-fn named_values(
-    name: &Text,
-    m: &super::spec::named_law::NamedSpec,
-) -> Result<Vec<f64>, SceneError> {
+fn named_values(name: &Text, m: &NamedSpec) -> Result<Vec<f64>, SceneError> {
     let parameters = m.law.parameters().iter().zip(&m.parameters);
     let mut values = Vec::with_capacity(m.parameters.len());
     for (parameter, typed) in parameters.clone() {
@@ -366,41 +445,14 @@ fn fracture(name: &Text, spec: &MaterialSpec) -> Result<Option<Fracture>, SceneE
     }))
 }
 
-/// The largest modulus, whose square times those of lengths still is a number.
-const STIFFEST: f64 = 1e100;
-
-fn constants<const D: usize>(
-    name: &Text,
-    spec: &MaterialSpec,
+/// Lamé's parameters of the scene's dimension, of an isotropic material.
+fn lame<const D: usize>(
+    (name, law): (&Text, &str),
+    (modulus, ratio): (&Number, Option<&Number>),
     kinematics: Kinematics,
-) -> Result<((f64, f64), f64), SceneError> {
-    let (kind, modulus, ratio, density) = match spec {
-        MaterialSpec::Umat(m) => (
-            "umat",
-            &m.youngs_modulus,
-            Some(&m.poisson_ratio),
-            &m.density,
-        ),
-        MaterialSpec::Named(m) => (
-            m.law.key(),
-            &m.youngs_modulus,
-            m.poisson_ratio.as_ref(),
-            &m.density,
-        ),
-    };
-    let place = |key: &str| format!("materials.{name}.{kind}.{key}");
-    bounds_checks::positive(&place("youngs-modulus"), modulus)?;
-    let e = bounds_checks::within(
-        &place("youngs-modulus"),
-        modulus,
-        modulus.value >= 1.0 / STIFFEST && modulus.value <= STIFFEST,
-        "too small or too large to be computed with",
-        "choose units in which it lies between 1e-100 and 1e100",
-    )?;
-    let density = match density {
-        Some(d) => bounds_checks::not_negative(&place("density"), d)?,
-        None => 0.0,
-    };
+) -> Result<(f64, f64), SceneError> {
+    let place = |key: &str| format!("materials.{name}.{law}.{key}");
+    let e = bounds_checks::modulus(&place("youngs-modulus"), modulus)?;
     let nu = match (ratio, kinematics) {
         (Some(ratio), _) => bounds_checks::within(
             &place("poisson-ratio"),
@@ -410,7 +462,7 @@ fn constants<const D: usize>(
             "use 0.2 to 0.35 for most solids, 0.49 for rubber; 0.5 has no finite stiffness",
         )?,
         // bonds that act alone carry equal Lamé parameters, in one dimension C = 3 μ
-        (None, Kinematics::Bar) => return Ok(((e / 3.0, e / 3.0), density)),
+        (None, Kinematics::Bar) => return Ok((e / 3.0, e / 3.0)),
         (None, Kinematics::PlaneStress) => 1.0 / 3.0,
         (None, Kinematics::PlaneStrain | Kinematics::Solid) => 0.25,
     };
@@ -418,6 +470,6 @@ fn constants<const D: usize>(
         SceneError::wrong_value(format!("`materials.{name}`: {error}"))
             .label(modulus.span.clone(), "of this material")
     };
-    let elastic = Elastic::new(e, nu, density).map_err(failed)?;
-    Ok((elastic.lame::<D>(kinematics).map_err(failed)?, density))
+    let elastic = Elastic::new(e, nu, 0.0).map_err(failed)?;
+    elastic.lame::<D>(kinematics).map_err(failed)
 }

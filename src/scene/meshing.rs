@@ -15,7 +15,7 @@ use super::spec::{
 use super::value::{Coordinates, Text};
 use crate::fem;
 use crate::mesh::generate::{Axis, CutOut, Grid, SIDES};
-use crate::mesh::{Mesh, MeshError, quality, read};
+use crate::mesh::{Mesh, MeshError, Order, quality, read};
 use crate::observe::checkpoint::Fingerprint;
 
 /// The most cells that a generated mesh may have: beyond it a typing error is likelier than a wish.
@@ -41,7 +41,7 @@ fn from_file<const D: usize>(
             _ => told,
         }
     };
-    let mesh: Mesh<D> = match &file.held {
+    let mut mesh: Mesh<D> = match &file.held {
         Some(parts) => parts.mesh_of(file.order).map_err(|error| {
             SceneError::mesh(format!("`mesh`: {error}"))
                 .help("the scene was given this mesh in memory")
@@ -62,6 +62,10 @@ fn from_file<const D: usize>(
             mesh
         }
     };
+    let is_second = mesh.shapes.iter().all(|shape| shape.is_quadratic());
+    if file.order == Order::Second && !is_second {
+        mesh.raise_order();
+    }
     // corners do not tell of a side that is curved too far
     fem::check(&mesh, |c| mesh.shapes[c].is_quadratic()).map_err(|error| {
         SceneError::mesh(format!("`mesh.file.path`: {error}"))

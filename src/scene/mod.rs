@@ -9,7 +9,8 @@
 //! | `spec/` | what is typed; the JSON Schema comes from here |
 //! | `parse.rs` | text to `SceneSpec`, with errors that underline |
 //! | `draft.rs`, `validated.rs` | `SceneSpec` to `Scene`: every name resolved, every number checked |
-//! | `meshing.rs`, `point_file.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `materials.rs`, `material_interfaces.rs`, `peridynamics.rs`, `default_points.rs`, `default_horizon.rs`, `cracks_and_voids.rs`, `crack_tips.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs`, `section.rs` | its parts |
+//! | `meshing.rs`, `point_file.rs`, `region.rs`, `zones.rs`, `lattice_regions.rs`, `horizon_change.rs`, `materials.rs`, `material_interfaces.rs`, `peridynamics.rs`, `default_points.rs`, `default_horizon.rs`, `cracks_and_voids.rs`, `crack_tips.rs`, `solve.rs`, `initial.rs`, `failure.rs`, `adaptive_zone.rs`, `output.rs`, `section.rs`, `bond_output.rs`, `file_name.rs` | its parts |
+//! | `stages.rs`, `load_stage.rs` | the stages that are typed, and what acts in each; load steps before a motion |
 //! | `coupling_selection.rs`, `selected_coupling.rs` | the coupling that is typed, or the one that suits the scene |
 //! | `coupling_kinds/` | the couplings that are typed, one file each |
 //! | `condition_kinds/` | the conditions that are typed, one file each: loads, supports, springs |
@@ -17,6 +18,7 @@
 //! | `components.rs`, `places.rs` | vector fields, and the sets and shapes that conditions name |
 //! | `temperature.rs`, `conduction.rs` | the temperature of the body; the heat conduction whose solution it is |
 //! | `impactors.rs` | rigid bodies that strike or press |
+//! | `elasticity.rs`, `orthotropic.rs` | linear elasticity of materials; orthotropic ones, of finite elements alone |
 //! | `user_material.rs` | materials of a user's routine |
 //! | `bounds_checks.rs` | numbers within their bounds |
 //! | `elements.rs` | what finite elements follow |
@@ -28,6 +30,7 @@
 
 pub(crate) mod adaptive_zone;
 pub(crate) mod agreement;
+pub(crate) mod bond_output;
 pub(crate) mod bounds_checks;
 pub mod build;
 pub(crate) mod components;
@@ -43,18 +46,23 @@ pub(crate) mod cracks_and_voids;
 mod default_horizon;
 pub mod default_points;
 pub(crate) mod draft;
+pub(crate) mod elasticity;
 pub(crate) mod elements;
 pub(crate) mod error;
 pub(crate) mod expression;
 pub(crate) mod failure;
+mod file_name;
 pub(crate) mod function;
+pub(crate) mod horizon_change;
 pub(crate) mod impactors;
 pub(crate) mod initial;
 pub(crate) mod lattice_regions;
 pub(crate) mod load;
+pub(crate) mod load_stage;
 pub(crate) mod material_interfaces;
 pub(crate) mod materials;
 pub(crate) mod meshing;
+pub(crate) mod orthotropic;
 pub(crate) mod output;
 pub(crate) mod parse;
 pub(crate) mod peridynamics;
@@ -67,6 +75,7 @@ pub(crate) mod selected_coupling;
 pub(crate) mod solve;
 pub(crate) mod source;
 pub mod spec;
+mod stages;
 pub(crate) mod table;
 mod table_rows;
 pub(crate) mod tagged_table;
@@ -81,6 +90,7 @@ pub(crate) mod zones;
 pub use crate::peridynamics::failure::Fracture;
 pub use adaptive_zone::Follow;
 pub use conditions::{Components, Condition, Field, Prescribed, Support};
+pub use elasticity::Elasticity;
 pub use error::{SceneError, SceneErrorKind};
 pub use expression::{Expression, ExpressionError};
 pub use failure::Breaking;
@@ -88,6 +98,7 @@ pub use function::Function;
 pub use impactors::{Impactor, ImpactorMotion};
 pub use initial::{Initial, InitialKind};
 pub use load::{Density, Domain, Load};
+pub use load_stage::LoadStage;
 pub use materials::Material;
 pub use peridynamics::Peridynamics;
 pub use region::Region;

@@ -2,16 +2,15 @@
 
 use std::path::PathBuf;
 
-use toml::Spanned;
-
-use super::bounds_checks;
 use super::error::SceneError;
+use super::file_name::part_of_a_file_name;
 use super::places::extent;
 use super::region::{self, Region};
 use super::section;
 use super::spec::{OutputSpec, SceneSpec, SolveSpec, TipSpec};
 use super::validated::{FieldChoice, Output, Tip};
 use super::value::Text;
+use super::{bond_output, bounds_checks};
 use crate::fem::Locator;
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
@@ -35,10 +34,7 @@ pub(crate) fn output<const D: usize>(
     (name, fingerprint): (&str, &Fingerprint),
 ) -> Result<Output<D>, SceneError> {
     let o = &spec.output;
-    let moves = !matches!(
-        spec.solve.as_ref().map(Spanned::get_ref),
-        None | Some(SolveSpec::Static(_))
-    );
+    let moves = !matches!(spec.analysis(), None | Some(SolveSpec::Static(_)));
     if let Some(name) = &o.name {
         part_of_a_file_name("output.name", name)?;
     }
@@ -87,12 +83,14 @@ pub(crate) fn output<const D: usize>(
     let tips = o.tips.iter().map(|(key, spec)| tip(key, spec, mesh));
     let tips = tips.collect::<Result<_, _>>()?;
     let sections = section::sections(&o.sections, mesh)?;
+    let bonds = bond_output::selections(spec, &probes, mesh)?;
     Ok(Output {
         directory: o
             .directory
             .as_ref()
             .map_or("out".into(), |d| d.value.clone().into()),
         name: o.name.as_ref().map_or(name.to_owned(), |n| n.value.clone()),
+        stage: None,
         origin: provenance::origin(fingerprint.value()),
         vtu: o.vtu.unwrap_or(true),
         points: o.points,
@@ -101,6 +99,7 @@ pub(crate) fn output<const D: usize>(
         probes,
         sections,
         tips,
+        bonds,
     })
 }
 
@@ -120,6 +119,23 @@ fn field_choice(spec: &OutputSpec, kinematics: Kinematics) -> FieldChoice {
 const ENERGY_DENSITY: &str = "energy-density";
 
 impl<const D: usize> Output<D> {
+    /// The same outputs of a stage before the last, whose name is in all of its files.
+    pub(crate) fn of_stage(&self, stage: &str) -> Self {
+        Self {
+            name: format!("{}_{stage}", self.name),
+            stage: Some(stage.to_owned()),
+            ..self.clone()
+        }
+    }
+
+    /// The name of a table, as observers are told.
+    pub(crate) fn table(&self, name: &str) -> String {
+        match &self.stage {
+            None => name.to_owned(),
+            Some(stage) => format!("{stage}_{name}"),
+        }
+    }
+
     /// Keeps others from the files of a scene while it runs on some `processes`; nothing to keep where it writes none.
     ///
     /// # Errors
@@ -172,6 +188,9 @@ impl<const D: usize> Output<D> {
                 ends.push(format!("_{SECTIONS}.csv"));
             }
         }
+        let bonds = self.bonds.iter().map(|of| of.stem(""));
+        let end = if moves { ".pvd" } else { ".vtu" };
+        ends.extend(bonds.map(|stem| format!("{stem}{end}")));
         if !ends.is_empty() {
             ends.push(PROVENANCE.to_owned());
         }
@@ -179,6 +198,10 @@ impl<const D: usize> Output<D> {
             name: name.clone(),
             files: ends.into_iter().map(|end| format!("{name}{end}")).collect(),
             series: moves,
+            others: match moves {
+                true => self.bonds.iter().map(|of| of.stem(name)).collect(),
+                false => Vec::new(),
+            },
         }
     }
 }
@@ -209,20 +232,6 @@ fn has_own_table(place: &str, key: &Text, o: &OutputSpec, moves: bool) -> Result
         .label(key.span.clone(), "both would be one file")
         .help("give the line another name")),
     }
-}
-
-/// Refuses a name that would put a file into another folder.
-fn part_of_a_file_name(place: &str, name: &Text) -> Result<(), SceneError> {
-    let stray = |c: char| matches!(c, '/' | '\\') || c.is_control();
-    if !name.value.is_empty() && !name.value.contains(stray) {
-        return Ok(());
-    }
-    Err(SceneError::wrong_value(format!(
-        "`{place}`: {:?} is no part of a file name",
-        name.value
-    ))
-    .label(name.span.clone(), "names files")
-    .help("use letters, digits, `-`, `_`, `.`; folders belong into output.directory"))
 }
 
 fn tip<const D: usize>(key: &Text, spec: &TipSpec, mesh: &Mesh<D>) -> Result<Tip<D>, SceneError> {

@@ -1,10 +1,8 @@
 //! The peridynamic choices of a validated scene: horizon, points, weights, influence function, partial volumes.
 
-use toml::Spanned;
-
 use super::bounds_checks;
 use super::default_horizon::horizon_of;
-use super::default_points::default_points;
+use super::default_points::{self, default_points};
 use super::error::SceneError;
 use super::expression::Expression;
 use super::region::position;
@@ -12,7 +10,7 @@ use super::solve;
 use super::spec::{InfluenceSpec, LatticeStart, PeridynamicsSpec, PointsSpec};
 use super::value::Number;
 use crate::mesh::Mesh;
-use crate::model::{PointSource, Surfaces, Zone};
+use crate::model::{HorizonChange, PointSource, Surfaces, Zone};
 use crate::peridynamics::{BondWeights, Influence, PartialVolume};
 use crate::tensor::{Vector, padded};
 
@@ -23,6 +21,8 @@ pub struct Peridynamics<const D: usize> {
     pub horizon: Expression,
     /// Reason for its size, if the scene does not type it.
     pub horizon_why: Option<String>,
+    /// Rule for bonds between points of different horizons.
+    pub horizon_change: HorizonChange,
     /// Positions of the points.
     pub points: PointSource<D>,
     /// Reason for their positions, as far as the scene does not type them.
@@ -80,6 +80,9 @@ pub(crate) fn peridynamics<const D: usize>(
             points_why = Some(why);
             points
         }
+        Some(PointsSpec::Cells) if is_partial(spec) => {
+            default_points::of_centroids(mesh).unwrap_or(PointSource::Cells)
+        }
         // each point of a file has a cell of its own
         Some(PointsSpec::Cells | PointsSpec::File(_)) => PointSource::Cells,
         Some(PointsSpec::Lattice(lattice)) => {
@@ -113,13 +116,15 @@ pub(crate) fn peridynamics<const D: usize>(
             PointSource::Lattice { spacing, origin }
         }
     };
+    let volumes = volumes(spec, matches!(points, PointSource::Lattice { .. }))?;
     Ok(Peridynamics {
         horizon,
         horizon_why,
+        horizon_change: HorizonChange::default(),
         points,
         points_why,
         weights: spec.weights,
-        volumes: volumes(spec)?,
+        volumes,
         // the cells of points from a file share no faces
         surfaces: match spec.points {
             Some(PointsSpec::File(_)) => Surfaces::Uncut,
@@ -145,10 +150,16 @@ fn check_horizon<const D: usize>(typed: &Expression) -> Result<(), SceneError> {
     Ok(())
 }
 
+/// Returns true if cells are typed to count in part.
+fn is_partial(spec: &PeridynamicsSpec) -> bool {
+    let typed = spec.volumes.as_ref().map(|typed| *typed.get_ref());
+    typed.is_some_and(|volumes| volumes != PartialVolume::Full)
+}
+
 /// The partial volumes typed; they need to know the cells of a lattice.
-fn volumes(spec: &PeridynamicsSpec) -> Result<PartialVolume, SceneError> {
-    let is_partial = |typed: &&Spanned<PartialVolume>| *typed.get_ref() != PartialVolume::Full;
-    let Some(typed) = spec.volumes.as_ref().filter(is_partial) else {
+fn volumes(spec: &PeridynamicsSpec, is_lattice: bool) -> Result<PartialVolume, SceneError> {
+    let typed = spec.volumes.as_ref().filter(|_| is_partial(spec));
+    let Some(typed) = typed else {
         return Ok(PartialVolume::Full);
     };
     let conflict = |message: &str, help: &str| {
@@ -156,9 +167,9 @@ fn volumes(spec: &PeridynamicsSpec) -> Result<PartialVolume, SceneError> {
             .label(typed.span(), "needs a lattice of points")
             .help(help))
     };
-    if matches!(spec.points, Some(PointsSpec::Cells | PointsSpec::File(_))) {
+    if !is_lattice {
         return conflict(
-            "`peridynamics.volumes` is partial, and the points are those of the mesh's cells or of a file",
+            "`peridynamics.volumes` is partial, and the points are those of a file, or of cells that are not all equal cubes of one grid",
             "give peridynamics.points.lattice a spacing, or use volumes = \"full\"",
         );
     }
@@ -481,12 +492,14 @@ y = 0.01
 
     #[test]
     fn partial_volumes_without_their_lattice_are_refused() {
-        for (set, word) in [
-            ("peridynamics.points=cells", "lattice"),
-            ("peridynamics.weights=fitted", "fitted"),
+        let oblong = "mesh.rectangle.max=[1, 0.9]";
+        for (sets, word) in [
+            (["peridynamics.points=cells", oblong], "lattice"),
+            (["peridynamics.weights=fitted", oblong], "fitted"),
         ] {
-            let error = plate(&["peridynamics.volumes=hhb", set]).err().unwrap();
-            assert!(error.to_string().contains(word), "{set}: {error}");
+            let all = [&["peridynamics.volumes=hhb"], &sets[..]].concat();
+            let error = plate(&all).err().unwrap();
+            assert!(error.to_string().contains(word), "{sets:?}: {error}");
         }
     }
 }

@@ -161,6 +161,6 @@ fn not_empty(place: &str, set: &Text, count: usize) -> Result<(), SceneError> {
     Err(
         SceneError::empty(format!("`{place}`: the set `{set}` of the mesh is empty"))
             .label(set.span.clone(), "empty")
-            .help("put facets or nodes into it, or name another set"),
+            .help("put facets or nodes of the body's cells into it, or name another set"),
     )
 }

@@ -240,10 +240,18 @@ fn name<'a>(typed: &'a Option<Text>, default: &'a str) -> &'a str {
 fn from_csv<const D: usize>(file: &PointFileSpec, path: &Path) -> Result<PointList<D>, SceneError> {
     let text = regular_file::read_to_string(path).map_err(|error| {
         let what = format!(" cannot be read: {error}");
-        wrong(file, path, &what, "the path is relative to the scene file")
+        wrong(file, path, &what, table_rows::remedy(&error))
     })?;
-    let mut lines = table_rows::lines(&text);
-    let (first, head) = lines.next().unwrap_or_default();
+    let mut lines = table_rows::lines(&text).peekable();
+    let is_number = |word: &&str| word.parse::<f64>().is_ok();
+    let begins = lines
+        .peek()
+        .is_some_and(|(_, row)| row.iter().all(is_number));
+    let commented = table_rows::commented_head(&text).filter(|_| begins);
+    let Some((first, head)) = commented.or_else(|| lines.next()) else {
+        let help = "name the columns in the first line, and give each point a row of its own";
+        return Err(wrong(file, path, " has no line", help));
+    };
     let names = [name(&file.x, "x"), name(&file.y, "y"), name(&file.z, "z")];
     let mut columns = Vec::with_capacity(D + 1);
     for wanted in names[..D]
@@ -261,6 +269,15 @@ fn from_csv<const D: usize>(file: &PointFileSpec, path: &Path) -> Result<PointLi
             let what = format!(", line {first}: no column `{wanted}` among {shown:?}");
             return Err(wrong(file, path, &what, &help));
         };
+        if known().filter(|word| *word == wanted).count() > 1 {
+            let what = format!(", line {first}: two columns `{wanted}`");
+            return Err(wrong(
+                file,
+                path,
+                &what,
+                "give each column a name of its own",
+            ));
+        }
         columns.push(column);
     }
     let mut list = PointList {
@@ -270,7 +287,7 @@ fn from_csv<const D: usize>(file: &PointFileSpec, path: &Path) -> Result<PointLi
     };
     for (line, words) in lines {
         let refuse = |what: String| {
-            let help = "each line holds a number for each column, separated by commas, semicolons or blanks";
+            let help = "each line holds a number for each column, with a decimal point, separated by commas, semicolons or blanks";
             wrong(file, path, &format!(", line {line}: {what}"), help)
         };
         if words.len() != head.len() {

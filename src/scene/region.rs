@@ -342,7 +342,9 @@ pub(crate) fn unknown_set<const D: usize>(
         format!("`{place}`: the mesh has no set `{name}`")
     };
     let list = if known.is_empty() {
-        format!("the mesh has no {wanted}; name one in Gmsh as a physical group")
+        format!(
+            "the mesh has no {wanted}; name one, in Gmsh as a physical group, in a deck by *SURFACE of elements"
+        )
     } else {
         format!("it has the {wanted} {}", quoted(known))
     };

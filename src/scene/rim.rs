@@ -81,8 +81,7 @@ fn before_others<const D: usize>(
     else {
         return scene;
     };
-    let law = scene.point_law.linearised();
-    let interface = scene.coupling.build(law).interface();
+    let interface = scene.method().interface();
     let ends_on_faces = interface.faces || interface.feet;
     let gains = ends_on_faces || interface.overlap && is_beside_others_than_boxes(&scene);
     if !gains || follows(&scene.mesh, &scene.zones, (*spacing, origin), OFF) {
@@ -251,14 +250,17 @@ fn told<const D: usize>(patched: &Patched<D>, edge: f64, why: &str) -> Decision 
     let embedded = &patched.mesh.embedded;
     let Replaced {
         linear,
+        halved,
         moved,
         divided,
-        ..
     } = &patched.replaced;
     let mut replaced = match linear {
         0 => String::new(),
         n => format!(", {n} of second order are linear there"),
     };
+    if *halved > 0 {
+        replaced += &format!(", {halved} quadrilaterals of second order are two triangles each");
+    }
     if *moved > STRAIGHT * edge {
         let moved = number(*moved);
         replaced += &format!(", with straight sides, which move their surfaces by up to {moved}");
@@ -355,11 +357,14 @@ fn refuse_others(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
 
 /// Distance from the zone up to which a coupling needs the lattice, beside one cell: nothing where bonds end on faces; else the width of the transition zone and as far as families reach.
 fn reach<const D: usize>(spec: &SceneSpec, before: &Scene<D>) -> Result<f64, String> {
-    let law = before.point_law.linearised();
-    let coupling = before.coupling.build(law);
-    if !coupling.interface().overlap {
+    let coupling = before.method();
+    let Some(law) = before
+        .point_law
+        .as_ref()
+        .filter(|_| coupling.interface().overlap)
+    else {
         return Ok(0.0);
-    }
+    };
     let width = match spec.zones.transition.as_ref().map(|t| t.get_ref()) {
         None => 0.0,
         Some(TransitionSpec::Around(width)) => width.value,
@@ -372,7 +377,7 @@ fn reach<const D: usize>(spec: &SceneSpec, before: &Scene<D>) -> Result<f64, Str
     };
     let horizon = before.peridynamics.as_ref().map(|p| &p.horizon);
     let horizon = horizon.and_then(|horizon| horizon.as_constant());
-    let families = match (&before.coupling, coupling.reach(law)) {
+    let families = match (&before.coupling, coupling.reach(law.linearised())) {
         // its blending reaches one family past the zone
         (CouplingSpec::Balanced(_), _) | (_, Reach::Neighbours) => 2.0,
         (_, Reach::Own) => 1.0,

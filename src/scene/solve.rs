@@ -81,6 +81,8 @@ pub struct QuasiStatic {
 pub(crate) enum Pacing {
     /// Nothing.
     Still,
+    /// Nothing: the same through several stages, each of which has a time of its own.
+    Lasting,
     /// The load.
     Loading,
     /// Time.
@@ -107,8 +109,16 @@ impl Clock {
 
     /// Refuses `t` where nothing moves.
     pub fn admits(&self, place: &str, expression: &Expression) -> Result<(), SceneError> {
-        if self.pacing != Pacing::Still || !expression.depends_on_time() {
+        let is_still = matches!(self.pacing, Pacing::Still | Pacing::Lasting);
+        if !is_still || !expression.depends_on_time() {
             return Ok(());
+        }
+        if self.pacing == Pacing::Lasting {
+            return Err(SceneError::conflict(format!(
+                "`{place}` depends on the time t in a scene of several stages"
+            ))
+            .label(expression.span.clone(), "each stage has a time of its own")
+            .help("use x, y, z only: a temperature lasts through all stages"));
         }
         Err(SceneError::conflict(format!("`{place}` depends on the time t in a static scene"))
             .label(expression.span.clone(), "t means nothing here")
@@ -124,9 +134,35 @@ impl QuasiStatic {
             None => step as f64 * (self.duration / self.steps as f64),
         }
     }
+
+    /// The time of the last load step.
+    pub fn end(&self) -> f64 {
+        match self.accuracy {
+            None => self.time_of(self.steps as u64),
+            Some(_) => self.duration,
+        }
+    }
+}
+
+impl Clock {
+    /// The clock of what lasts through several stages.
+    pub(crate) fn lasting() -> Self {
+        Self {
+            pacing: Pacing::Lasting,
+            instants: [0.0; 9],
+        }
+    }
 }
 
 impl Solve {
+    /// The motion, if it is one.
+    pub fn motion(&self) -> Option<&Explicit> {
+        match self {
+            Self::Explicit(motion) => Some(motion),
+            Self::Static | Self::QuasiStatic(_) => None,
+        }
+    }
+
     /// Returns the meaning of `t`.
     pub(crate) fn clock(&self) -> Clock {
         let (pacing, end) = match self {
@@ -154,7 +190,7 @@ pub(crate) fn still(place: &str, expression: &Expression) -> Result<(), SceneErr
     )
 }
 
-/// Reads the analysis of a scene.
+/// Reads the analysis of a scene of one stage.
 ///
 /// `has_large_strains` tells of materials for strains of any size: they stiffen as they are compressed, and the stable step is that of the undeformed body.
 pub(crate) fn solve(
@@ -162,9 +198,13 @@ pub(crate) fn solve(
     has_large_strains: bool,
 ) -> Result<Solve, SceneError> {
     Ok(match spec.map(Spanned::get_ref) {
-        None | Some(SolveSpec::Static(_)) => Solve::Static,
-        Some(SolveSpec::Explicit(e)) => Solve::Explicit(explicit(e, has_large_strains)?),
-        Some(SolveSpec::QuasiStatic(q)) => Solve::QuasiStatic(quasi_static(q)?),
+        None | Some(SolveSpec::Static(_) | SolveSpec::Stages(_)) => Solve::Static,
+        Some(SolveSpec::Explicit(e)) => {
+            Solve::Explicit(explicit("solve.explicit", e, has_large_strains)?)
+        }
+        Some(SolveSpec::QuasiStatic(q)) => {
+            Solve::QuasiStatic(quasi_static("solve.quasi-static", q)?)
+        }
     })
 }
 
@@ -173,22 +213,27 @@ fn pace(every: Option<&Every>) -> Option<Pace> {
 }
 
 /// The time between files.
-fn output_interval(spec: &ExplicitSpec, duration: f64) -> Result<f64, SceneError> {
+fn output_interval(at: &str, spec: &ExplicitSpec, duration: f64) -> Result<f64, SceneError> {
     let output_interval = match (&spec.outputs, &spec.output_interval) {
         (Some(count), Some(interval)) => {
-            return Err(SceneError::conflict(
-                "`solve.explicit` has both `outputs` and `output-interval`",
-            )
+            return Err(SceneError::conflict(format!(
+                "`{at}` has both `outputs` and `output-interval`"
+            ))
             .label(count.span.clone(), "a number of files")
             .label(interval.span.clone(), "a time between files")
             .help("keep one of them"));
         }
         (Some(count), None) => duration / count.value.max(1) as f64,
-        (None, given) => interval("output-interval", given, duration, duration / 20.0)?,
+        (None, given) => interval(
+            &format!("{at}.output-interval"),
+            given,
+            duration,
+            duration / 20.0,
+        )?,
     };
     if duration / output_interval > MOST_FILES {
         return Err(SceneError::wrong_value(format!(
-            "`solve.explicit` asks for {:.1e} VTU files",
+            "`{at}` asks for {:.1e} VTU files",
             duration / output_interval
         ))
         .label(spec.duration.span.clone(), "over this time")
@@ -201,7 +246,7 @@ fn output_interval(spec: &ExplicitSpec, duration: f64) -> Result<f64, SceneError
 
 /// A time between rows or files; the default where the scene leaves it out.
 fn interval(
-    key: &str,
+    place: &str,
     number: &Option<Number>,
     duration: f64,
     default: f64,
@@ -209,7 +254,7 @@ fn interval(
     match number {
         None => Ok(default),
         Some(n) => bounds_checks::within(
-            &format!("solve.explicit.{key}"),
+            place,
             n,
             n.value > 0.0 && n.value <= duration,
             "must be positive and at most the duration",
@@ -218,9 +263,13 @@ fn interval(
     }
 }
 
-/// A scene in time: its steps, and how often it is written and watched.
-fn explicit(spec: &ExplicitSpec, has_large_strains: bool) -> Result<Explicit, SceneError> {
-    let place = |key: &str| format!("solve.explicit.{key}");
+/// A motion that is typed `at` a place: its steps, and how often it is written and watched.
+pub(super) fn explicit(
+    at: &str,
+    spec: &ExplicitSpec,
+    has_large_strains: bool,
+) -> Result<Explicit, SceneError> {
+    let place = |key: &str| format!("{at}.{key}");
     let duration = bounds_checks::positive(&place("duration"), &spec.duration)?;
     let step = match spec.step.value {
         Some(value) if !(value > 0.0 && value <= duration) => {
@@ -246,13 +295,13 @@ fn explicit(spec: &ExplicitSpec, has_large_strains: bool) -> Result<Explicit, Sc
         None if has_large_strains => 0.5,
         None => 0.95,
     };
-    let output_interval = output_interval(spec, duration)?;
+    let output_interval = output_interval(at, spec, duration)?;
     Ok(Explicit {
         duration,
         step,
         fraction,
         beyond_limit: spec.beyond_limit,
-        sub_steps: sub_steps(spec.sub_steps.as_ref())?,
+        sub_steps: sub_steps(&place("sub-steps"), spec.sub_steps.as_ref())?,
         largest_energy_gain: match &spec.largest_energy_gain {
             Some(gain) => bounds_checks::positive(&place("largest-energy-gain"), gain)?,
             None => LARGEST_ENERGY_GAIN,
@@ -260,7 +309,7 @@ fn explicit(spec: &ExplicitSpec, has_large_strains: bool) -> Result<Explicit, Sc
         largest_rotation: rotation(&place("largest-rotation"), spec.largest_rotation.as_ref())?,
         output_interval,
         history_interval: interval(
-            "history-interval",
+            &place("history-interval"),
             &spec.history_interval,
             duration,
             duration / 1000.0,
@@ -286,12 +335,12 @@ fn rotation(place: &str, degrees: Option<&Number>) -> Result<Option<f64>, SceneE
     Ok(Some(value))
 }
 
-fn sub_steps(count: Option<&Count>) -> Result<Option<u32>, SceneError> {
+fn sub_steps(place: &str, count: Option<&Count>) -> Result<Option<u32>, SceneError> {
     let Some(count) = count else { return Ok(None) };
     match u32::try_from(count.value) {
         Ok(1) => Ok(None),
         Ok(n) if (2..=sub_cycling::MOST).contains(&n) => Ok(Some(n)),
-        _ => Err(SceneError::wrong_value(format!("`solve.explicit.sub-steps` is {}", count.value))
+        _ => Err(SceneError::wrong_value(format!("`{place}` is {}", count.value))
             .label(
                 count.span.clone(),
                 format!("must be from 1 to {}", sub_cycling::MOST),
@@ -304,13 +353,11 @@ fn sub_steps(count: Option<&Count>) -> Result<Option<u32>, SceneError> {
 const MOST_FILES: f64 = 1e5;
 
 /// The times of load steps that are listed.
-fn listed(spec: &QuasiStaticSpec, times: &[f64]) -> Result<Vec<f64>, SceneError> {
+fn listed(place: &str, spec: &QuasiStaticSpec, times: &[f64]) -> Result<Vec<f64>, SceneError> {
     let refuse = |what: String, label: &str, help: &str| {
-        Err(
-            SceneError::wrong_value(format!("`solve.quasi-static.steps` {what}"))
-                .label(spec.steps.span.clone(), label)
-                .help(help),
-        )
+        Err(SceneError::wrong_value(format!("`{place}.steps` {what}"))
+            .label(spec.steps.span.clone(), label)
+            .help(help))
     };
     let order = "list the times of the load steps, larger than 0 and increasing: [0.5, 0.8, 1]; the state at t = 0 comes before them";
     if times.is_empty() {
@@ -341,8 +388,7 @@ fn listed(spec: &QuasiStaticSpec, times: &[f64]) -> Result<Vec<f64>, SceneError>
 const ACCURACY: f64 = 0.01;
 
 /// The accuracy of the load of adaptive steps; none of others.
-fn accuracy(spec: &QuasiStaticSpec) -> Result<Option<f64>, SceneError> {
-    let place = "solve.quasi-static.accuracy";
+fn accuracy(place: &str, spec: &QuasiStaticSpec) -> Result<Option<f64>, SceneError> {
     let is_auto = spec.steps.choice == StepTimes::Auto;
     match &spec.accuracy {
         None => Ok(is_auto.then_some(ACCURACY)),
@@ -362,8 +408,9 @@ fn accuracy(spec: &QuasiStaticSpec) -> Result<Option<f64>, SceneError> {
     }
 }
 
-fn quasi_static(spec: &QuasiStaticSpec) -> Result<QuasiStatic, SceneError> {
-    let place = |key: &str| format!("solve.quasi-static.{key}");
+/// Load steps that are typed `at` a place.
+pub(super) fn quasi_static(at: &str, spec: &QuasiStaticSpec) -> Result<QuasiStatic, SceneError> {
+    let place = |key: &str| format!("{at}.{key}");
     let count = |key: &str, number: &Count| {
         if number.value > 0 {
             return Ok(number.value);
@@ -381,12 +428,12 @@ fn quasi_static(spec: &QuasiStaticSpec) -> Result<QuasiStatic, SceneError> {
             (count("steps", &number)?, Vec::new())
         }
         StepTimes::Listed(times) => {
-            let listed = listed(spec, times)?;
+            let listed = listed(at, spec, times)?;
             (listed.len(), listed)
         }
         StepTimes::Auto => (INTERVALS, Vec::new()),
     };
-    let accuracy = accuracy(spec)?;
+    let accuracy = accuracy(&place("accuracy"), spec)?;
     let duration = match &spec.duration {
         Some(d) => bounds_checks::positive(&place("duration"), d)?,
         None => times.last().copied().unwrap_or(1.0),

@@ -231,6 +231,23 @@ impl Source {
         Ok(plain_table(self.merged()?.get_ref()))
     }
 
+    /// The keys of the table at `path` in the order in which they are typed, overrides last; none where there is no such table.
+    pub fn typed_keys(&self, path: &[&str]) -> Vec<String> {
+        let Ok(root) = self.merged() else {
+            return Vec::new();
+        };
+        let mut table = root.get_ref();
+        for key in path {
+            match table.get(*key).map(Spanned::get_ref) {
+                Some(DeValue::Table(inner)) => table = inner,
+                _ => return Vec::new(),
+            }
+        }
+        let mut keys: Vec<_> = table.iter().map(|(key, _)| key).collect();
+        keys.sort_by_key(|key| key.span().start);
+        keys.iter().map(|key| key.get_ref().to_string()).collect()
+    }
+
     /// The scene as one TOML text with all overrides applied; a mesh file and libraries of routines are looked for from `folder`, wherever the text will lie.
     ///
     /// # Errors
@@ -407,7 +424,14 @@ const WITHOUT_EFFECT: &[&[&str]] = &[
 /// Returns true for a key that changes no result, and for a table of such keys alone.
 fn is_without_effect(path: &[String], value: &DeValue<'_>) -> bool {
     let is_one = |key: Option<&str>| {
-        let path = || path.iter().map(String::as_str).chain(key);
+        // a stage has the keys of `solve`
+        let (first, rest) = match path {
+            [stages, _, rest @ ..] if stages == "stages" => ("solve", rest),
+            [first, rest @ ..] => (first.as_str(), rest),
+            [] => return false,
+        };
+        let rest = || rest.iter().map(String::as_str).chain(key);
+        let path = || std::iter::once(first).chain(rest());
         WITHOUT_EFFECT.iter().any(|p| path().eq(p.iter().copied()))
     };
     let of_such = |table: &DeTable<'_>| {
@@ -461,8 +485,12 @@ pub fn read<'p>(
     overrides: &[String],
 ) -> Result<(Source, &'p Path, String), SceneError> {
     let text = regular_file::read_scene(path).map_err(|error| {
-        SceneError::file(format!("cannot read the scene {}: {error}", path.display()))
-            .help("check the path; `bondline new scene.toml` writes a template")
+        SceneError::file(format!("cannot read the scene {}: {error}", path.display())).help(
+            regular_file::remedy(
+                &error,
+                "check the path; `bondline new scene.toml` writes a template",
+            ),
+        )
     })?;
     let mut source = Source::new(path.display().to_string(), text);
     for text in overrides {

@@ -125,12 +125,8 @@ pub(crate) fn read_files(
                 .label(file.span.clone(), "this file")
                 .help(help)
         };
-        let text = regular_file::read_to_string(&path).map_err(|error| {
-            refuse(
-                format!(" cannot be read: {error}"),
-                "the path is relative to the scene file",
-            )
-        })?;
+        let text = regular_file::read_to_string(&path)
+            .map_err(|error| refuse(format!(" cannot be read: {error}"), remedy(&error)))?;
         let rows = rows_of(&text).map_err(|(line, what)| {
             refuse(
                 format!(", line {line}: {what}"),
@@ -146,16 +142,37 @@ pub(crate) fn read_files(
     Ok(())
 }
 
-/// The lines of a table by their numbers, from 1, and their words, between commas, semicolons or blanks; empty lines and those that begin with # are left out.
+/// The remedy for a file of rows that cannot be read.
+pub(super) fn remedy(error: &std::io::Error) -> &'static str {
+    regular_file::remedy(error, "the path is relative to the scene file")
+}
+
+/// The lines of a text by their numbers, from 1, without blanks around them; they may end in a carriage return alone.
+fn trimmed(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let end = if text.contains('\n') { '\n' } else { '\r' };
+    let lines = text.trim_start_matches('\u{feff}').split(end);
+    (1..).zip(lines.map(str::trim))
+}
+
+/// The words of a line: between semicolons if it has any, else between commas, else between blanks.
+fn words(line: &str) -> Vec<&str> {
+    match [';', ','].into_iter().find(|&c| line.contains(c)) {
+        Some(between) => line.split(between).map(str::trim).collect(),
+        None => line.split_whitespace().collect(),
+    }
+}
+
+/// The lines of a table by their numbers, from 1, and their words, between semicolons, commas or blanks; empty lines and those that begin with # are left out.
 pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
-    text.lines().enumerate().filter_map(|(number, line)| {
-        let line = line.trim().trim_start_matches('\u{feff}');
-        let words = match line.contains([',', ';']) {
-            true => line.split([',', ';']).map(str::trim).collect(),
-            false => line.split_whitespace().collect(),
-        };
-        (!line.is_empty() && !line.starts_with('#')).then_some((number + 1, words))
-    })
+    let rows = trimmed(text).filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    rows.map(|(number, line)| (number, words(line)))
+}
+
+/// The words of the last line with # before the first row, without the mark: numpy writes the names of columns so.
+pub(super) fn commented_head(text: &str) -> Option<(usize, Vec<&str>)> {
+    let before = trimmed(text).take_while(|(_, line)| line.is_empty() || line.starts_with('#'));
+    let (number, line) = before.filter(|(_, line)| !line.is_empty()).last()?;
+    Some((number, words(line.trim_start_matches('#').trim())))
 }
 
 /// The rows of a file, or the line at fault and what is wrong with it.

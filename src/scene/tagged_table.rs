@@ -11,10 +11,9 @@ use toml::de::{DeTable, DeValue};
 use super::condition_kinds::ConditionSpec;
 use super::error::{SceneError, SceneErrorKind, closest, quoted};
 use super::spec::{
-    AxisSpec, CouplingSpec, HeatConditionSpec, InitialSpec, MeshSpec, MicromodulusSpec, PointsSpec,
-    ShapeSpec, SolveSpec, TransitionSpec,
+    AxisSpec, BondLinesSpec, CouplingSpec, HeatConditionSpec, InitialSpec, MaterialSpec, MeshSpec,
+    MicromodulusSpec, PointsSpec, ShapeSpec, SolveSpec, TransitionSpec,
 };
-use crate::peridynamics::laws::Named;
 
 /// Keys of the top of a scene that often end up below the header of a table.
 const TOP: &[&str] = &[
@@ -28,6 +27,7 @@ const TOP: &[&str] = &[
     "zones",
     "coupling",
     "solve",
+    "stages",
     "conditions",
     "initial",
     "voids",
@@ -81,22 +81,24 @@ pub(crate) fn options(path: &[&str]) -> Option<Vec<&'static str>> {
     Some(match path {
         ["coupling"] => keys::<CouplingSpec>(),
         ["solve"] => keys::<SolveSpec>(),
+        ["stages", _] => vec!["explicit", "quasi-static"],
         ["initial", _] => keys::<InitialSpec>(),
         ["mesh"] => keys::<MeshSpec>(),
         ["mesh", _, "x" | "y" | "z"] => keys::<AxisSpec>(),
-        ["materials", _] => Named::KEYS.iter().copied().chain(["umat"]).collect(),
+        ["materials", _] => MaterialSpec::keys().to_vec(),
         ["materials", _, _, "micromodulus"] => keys::<MicromodulusSpec>(),
         ["peridynamics", "points"] => keys::<PointsSpec>(),
         ["conditions", _] => ConditionSpec::KEYS.to_vec(),
         ["temperature", "conduction", "conditions", _] => keys::<HeatConditionSpec>(),
         ["zones", "transition"] => keys::<TransitionSpec>(),
+        ["output", "bonds", _] => keys::<BondLinesSpec>(),
         ["zones", "nonlocal"]
         | ["conditions" | "initial", _, _, "inside"]
         | ["zones", "bodies", _, "inside"]
         | ["temperature", "conduction", "conditions", _, _, "inside"]
         | ["voids", _, "inside"]
         | ["materials", _, _, "cells"]
-        | ["output", "tips", _, "inside"]
+        | ["output", "tips" | "bonds", _, "inside"]
         | ["cracks" | "no-fail", _] => keys::<ShapeSpec>(),
         _ => return None,
     })
@@ -158,6 +160,15 @@ fn text_to_table(value: &mut Spanned<DeValue<'_>>, path: &[String]) {
         return;
     }
     let span = value.span();
+    // the names of stages in their order
+    if path[..] == ["solve"] && matches!(value.get_ref(), DeValue::Array(_)) {
+        let names = std::mem::replace(value.get_mut(), DeValue::Boolean(false));
+        let mut table = DeTable::new();
+        let key = Spanned::new(span.clone(), "stages".into());
+        table.insert(key, Spanned::new(span, names));
+        *value.get_mut() = DeValue::Table(table);
+        return;
+    }
     if let DeValue::String(name) = value.get_mut() {
         let name = std::mem::take(name);
         let (key, inner) = match is_set {

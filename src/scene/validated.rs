@@ -4,16 +4,19 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::adaptive_zone::Follow;
+use super::bond_output::BondSelection;
 use super::conditions::Condition;
 use super::failure::Breaking;
 use super::impactors::Impactor;
 use super::initial::Initial;
+use super::load_stage::LoadStage;
 use super::materials::Material;
 use super::peridynamics::Peridynamics;
 use super::region::Region;
 use super::section::Section;
 use super::solve::Solve;
 use super::spec::{CouplingSpec, ElementsSpec, UnprovenSpec};
+use crate::coupling::{Coupling, Local};
 use crate::material::Kinematics;
 use crate::mesh::Mesh;
 use crate::model::Zone;
@@ -42,8 +45,8 @@ pub struct Scene<const D: usize> {
     pub cell_material: Vec<u16>,
     /// The materials that points have, that of the first cell of the zones first; never empty.
     pub point_materials: Vec<u16>,
-    /// The law of the points, of all their materials.
-    pub point_law: Arc<dyn Law<D>>,
+    /// The law of the points, of all their materials; none where no cell holds points and the first material has no law.
+    pub point_law: Option<Arc<dyn Law<D>>>,
     /// The peridynamic choices; none if the scene is local throughout.
     pub peridynamics: Option<Peridynamics<D>>,
     /// Coupling of the models.
@@ -54,7 +57,9 @@ pub struct Scene<const D: usize> {
     pub placement: Option<Placement>,
     /// Choices made for the accuracy that the scene wants, and for points that it does not place.
     pub choices: Vec<Decision>,
-    /// Displacements, tractions, body forces.
+    /// Load steps before a motion, whose last state of equilibrium it begins with.
+    pub before: Option<LoadStage<D>>,
+    /// Displacements, tractions, body forces; of a scene in stages those that act in the last.
     pub conditions: Vec<Condition<D>>,
     /// The temperature, if the scene has one.
     pub temperature: Option<super::temperature::Temperature<D>>,
@@ -62,7 +67,7 @@ pub struct Scene<const D: usize> {
     pub voids: Vec<Shape<D>>,
     /// Voids and cracks that cut bonds.
     pub barriers: Vec<Barrier<D>>,
-    /// Type of analysis.
+    /// Type of analysis; of a scene in stages that of the last.
     pub solve: Solve,
     /// Displacements and velocities at time zero.
     pub initial: Vec<Initial<D>>,
@@ -144,6 +149,8 @@ pub struct Output<const D: usize> {
     pub directory: PathBuf,
     /// Beginning of all file names.
     pub name: String,
+    /// The stage whose files they are, of all but the last of a scene in stages.
+    pub stage: Option<String>,
     /// Program and scene, as files name them: `bondline 0.1.0, scene 0123456789abcdef`.
     pub origin: String,
     /// True if a VTU is written.
@@ -160,6 +167,8 @@ pub struct Output<const D: usize> {
     pub sections: Vec<Section<D>>,
     /// Tips of cracks to follow.
     pub tips: Vec<Tip<D>>,
+    /// Bonds that are shown as lines.
+    pub bonds: Vec<BondSelection<D>>,
 }
 
 /// The tip of a crack: the farthest damaged point along a direction.
@@ -195,6 +204,14 @@ impl<const D: usize> Scene<D> {
     pub fn unused(&self) -> Vec<Warning> {
         let of = |text: &String| Warning::new(Code::Unused, text.as_str());
         self.unused.iter().map(of).collect()
+    }
+
+    /// The method of the coupling for the law of the points; finite elements alone where there is none.
+    pub fn method(&self) -> Box<dyn Coupling<D>> {
+        match &self.point_law {
+            Some(law) => self.coupling.build(law.linearised()),
+            None => Box::new(Local),
+        }
     }
 
     /// Returns true if the horizon varies in space.

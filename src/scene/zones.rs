@@ -6,7 +6,9 @@ use super::error::SceneError;
 use super::places::extent;
 use super::region::{self, Region};
 use super::source::Span;
-use super::spec::{CouplingSpec, SceneSpec, ShapeSpec, SkinSpec, TransitionSpec, ZonesNeeded};
+use super::spec::{
+    CouplingSpec, FormSpec, SceneSpec, ShapeSpec, SkinSpec, TransitionSpec, ZonesNeeded,
+};
 use crate::mesh::Mesh;
 use crate::scene::selected_coupling::SelectedCoupling;
 use crate::tensor::{Vector, padded};
@@ -39,6 +41,11 @@ fn nonlocal_region<const D: usize>(
             let region = region::region("zones.nonlocal", n.get_ref(), mesh)?;
             (region, n.span())
         }
+        // a partial stress lets the horizon vary throughout a body without a zone of whole families
+        (None, None) if is_stress_alone(spec, selected) => {
+            let span = spec.zones.transition.as_ref().map(|t| t.span());
+            (Region::Cells(Vec::new()), span.unwrap_or(0..0))
+        }
         (None, None) => {
             return Err(SceneError::missing(format!("coupling `{}` needs a nonlocal zone", selected.traits.name))
                 .label(selected.span.clone(), "couples a local and a nonlocal zone")
@@ -47,6 +54,16 @@ fn nonlocal_region<const D: usize>(
                 ));
         }
     })
+}
+
+/// Returns true if elements carry a partial stress in a transition zone that is drawn by itself.
+fn is_stress_alone(spec: &SceneSpec, selected: &SelectedCoupling) -> bool {
+    let CouplingSpec::PartialStress(method) = &selected.coupling else {
+        return false;
+    };
+    let transition = spec.zones.transition.as_ref().map(|t| t.get_ref());
+    let is_drawn = transition.is_some_and(|t| !matches!(t, TransitionSpec::Around(_)));
+    spec.zones.nonlocal.is_none() && is_drawn && method.form == FormSpec::Elements
 }
 
 /// The nonlocal zone as it is drawn or placed.
@@ -142,7 +159,7 @@ pub(crate) fn zones<const D: usize>(
     }
     let (region, span) = nonlocal_region(spec, selected, mesh, placed)?;
     let inner = region.select(mesh);
-    if !inner.contains(&true) {
+    if !inner.contains(&true) && !is_stress_alone(spec, selected) {
         return Err(empty("zones.nonlocal", span, mesh));
     }
     let mut zones: Vec<Zone> = inner

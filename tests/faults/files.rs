@@ -18,7 +18,7 @@ output.vtu = false
 "#;
 
 /// Nodes and cells, clockwise if wanted, of a strip of 4 by 2 squares.
-fn strip(is_clockwise: bool) -> String {
+pub(super) fn strip(is_clockwise: bool) -> String {
     let mut deck = String::from("*NODE\n");
     for k in 0..15 {
         let _ = writeln!(deck, "{}, {}, {}", k + 1, k % 5, k / 5);
@@ -38,7 +38,7 @@ fn strip(is_clockwise: bool) -> String {
 }
 
 /// The face of each cell at the right, of both ways round.
-fn right(is_clockwise: bool) -> String {
+pub(super) fn right(is_clockwise: bool) -> String {
     let face = if is_clockwise { "S3" } else { "S2" };
     format!("*SURFACE, NAME=RIGHT, TYPE=ELEMENT\nENDS, {face}\n*ELSET, ELSET=ENDS\n104, 108\n")
 }
@@ -61,7 +61,12 @@ fn run_scene(scene: &str, (name, content): (&str, &[u8]), set: &[&str]) -> (Stri
 }
 
 /// Runs the strip of a file; returns what was told, and the displacement of the probe.
-fn run(kinematics: &str, name: &str, content: &[u8], set: &[&str]) -> (String, Option<[f64; 2]>) {
+pub(super) fn run(
+    kinematics: &str,
+    name: &str,
+    content: &[u8],
+    set: &[&str],
+) -> (String, Option<[f64; 2]>) {
     let scene = PULLED
         .replace("KINEMATICS", kinematics)
         .replace("FILE", name);
@@ -70,7 +75,7 @@ fn run(kinematics: &str, name: &str, content: &[u8], set: &[&str]) -> (String, O
 }
 
 /// `σ L/E`, and `−ν σ y/E`.
-fn is_pulled(u: Option<[f64; 2]>, told: &str) {
+pub(super) fn is_pulled(u: Option<[f64; 2]>, told: &str) {
     let u = u.unwrap_or_else(|| panic!("{told}"));
     let off = (u[0] - 0.04).abs().max((u[1] + 0.0015).abs());
     assert!(off < 1e-12, "{u:?}\n{told}");

@@ -5,6 +5,7 @@ mod advice;
 mod any_faces;
 mod b;
 mod cantilever;
+mod dialects;
 mod e;
 mod f;
 mod files;

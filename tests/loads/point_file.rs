@@ -174,7 +174,7 @@ fn clouds_that_are_none_are_refused() {
         &[],
         &["line 1: no column `x`", "the first line names the columns"],
     );
-    case("", &[], &["no column `x`"]);
+    case("", &[], &["cloud.csv has no line", "name the columns"]);
     case("x,y,volume\n", &[], &["cloud.csv has no point"]);
     case(
         "x,y,volume\n\n0,nan,1\n",
@@ -230,7 +230,7 @@ fn points_of_a_file_go_without_a_mesh() {
     refused(
         &scene,
         &["peridynamics.volumes=hhb"],
-        &["those of the mesh's cells or of a file"],
+        &["`peridynamics.volumes` is partial", "those of a file"],
     );
     refused(
         &scene,
@@ -293,4 +293,69 @@ fn damage_counts_what_cracks_of_the_scene_cut() {
     assert_eq!(at(1.025, 0.875), 0.0);
     let none = solved(&text, &["solve.quasi-static={steps=[1e-3]}", "cracks={}"]);
     assert!(none.field("damage").unwrap().iter().all(|d| *d == 0.0));
+}
+
+/// Heads and numbers of tables as other programs write them.
+#[test]
+fn tables_of_points_are_read_as_they_are_written_or_refused_with_the_line() {
+    const PULLED: &str = r#"
+kinematics = "bar"
+coupling = "nonlocal"
+materials.bar.bond-based.youngs-modulus = 5
+peridynamics = { horizon = 0.3, POINTS }
+conditions.low.displacement = { inside.box = { min = [0], max = [0.3] }, x = 0 }
+conditions.high.displacement = { inside.box = { min = [1.7], max = [2] }, x = 0.01 }
+"#;
+    let folder = tempfile::tempdir().unwrap();
+    let rows = |between: &str| -> String {
+        let row = |k: i32| format!("{:.2}{between}0.1\n", 0.05 + 0.1 * f64::from(k));
+        (0..20).map(row).collect()
+    };
+    let scene = |text: &[u8]| {
+        let path = folder.path().join("bar.csv");
+        std::fs::write(&path, text).unwrap();
+        let points = format!("points.file.path = {:?}", path.display().to_string());
+        PULLED.replace("POINTS", &points)
+    };
+    // numpy writes the names of columns behind #; some editors end lines in a carriage return alone
+    for text in [
+        format!("x,volume\n{}", rows(",")),
+        format!("# x,volume\n{}", rows(",")),
+        format!("# made by hand\n\n#x volume\n{}", rows(" ")),
+        format!("# a comment\nx;volume\n{}", rows(";")),
+        format!("\"x\";\"volume\"\n{}", rows(";")),
+        format!("x\tvolume\n{}", rows("\t")).replace('\n', "\r\n"),
+        format!("x,volume\n{}", rows(",")).replace('\n', "\r"),
+    ] {
+        let done = solved(&scene(text.as_bytes()), &[]);
+        let largest = done.frames().last().unwrap().displacement().unwrap();
+        let largest = largest.iter().fold(0.0, |m: f64, u| m.max(u[0]));
+        assert!((largest - 0.01).abs() < 1e-12, "{text}");
+    }
+    let cases: [(&[u8], &[&str]); 6] = [
+        (
+            b"x;volume\n0,05;0,1\n",
+            &["line 2: `0,05` is no number", "a decimal point"],
+        ),
+        (
+            b"x,x,volume\n0.05,1,0.1\n",
+            &["line 1: two columns `x`", "a name of its own"],
+        ),
+        (
+            b"x,gr\xf6\xdfe,volume\n",
+            &["cannot be read", "save it as text in UTF-8"],
+        ),
+        (b"# nothing\n", &["has no line", "name the columns"]),
+        (
+            b"#x,volume\n0.05,nan\n",
+            &["line 2: the volume NaN", "length above zero"],
+        ),
+        (
+            b"0.05,0.1\n",
+            &["line 1: no column `x` among [\"0.05\", \"0.1\"]"],
+        ),
+    ];
+    for (text, parts) in cases {
+        refused(&scene(text), &[], parts);
+    }
 }

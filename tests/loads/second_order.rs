@@ -1,5 +1,7 @@
 //! Cells of second order under body forces and temperatures, alone and beside points, against closed forms.
 
+use vtkio::model::{Attribute, DataSet, Vtk};
+
 use super::{Done, run};
 
 /// A block of a plane or of a solid; the cells, the zone and what acts are put in.
@@ -216,4 +218,86 @@ fn a_plate_of_cells_of_second_order_is_pressed_between_walls() {
             }
         }
     }
+}
+
+/// A quarter of a ring under pressure on a surface that stands before its sets, supported in cylindrical systems, as CalculiX 2.20 solves the deck: its
+/// digits for all nodes, radial and tangential where the deck turns them.
+#[test]
+fn a_deck_of_second_order_has_the_digits_of_calculix() {
+    let done = run(
+        r#"
+kinematics = "plane-strain"
+coupling = "local"
+mesh.file.path = "MESHES/../tests/fixtures/ring_calculix.inp"
+materials.steel.lps = { youngs-modulus = 200, poisson-ratio = 0.3 }
+conditions.foot.displacement = { on = "NLOW", y = 0 }
+conditions.side.displacement = { on = "NHIGH", x = 0 }
+conditions.bore.pressure = { on = "BORE", value = 10 }
+"#,
+        &[],
+    );
+    let told = done.summary.warnings.iter().map(|w| &w.message);
+    assert!(
+        told.clone()
+            .any(|w| w.contains("*TRANSFORM (line 56, line 58)")),
+        "{:?}",
+        done.summary.warnings
+    );
+    let frame = mesh_of(&done.folder.path().join("scene.vtu"));
+    let fixture = |name: &str| {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/fixtures/");
+        std::fs::read_to_string(format!("{folder}{name}")).unwrap()
+    };
+    let (deck, digits) = (fixture("ring_calculix.inp"), fixture("ring_calculix.dat"));
+    let place = |node: &str| -> [f64; 2] {
+        let line = deck
+            .lines()
+            .find(|l| l.starts_with(&format!("{node}, ")))
+            .unwrap();
+        let words: Vec<f64> = line
+            .split(", ")
+            .skip(1)
+            .map(|w| w.parse().unwrap())
+            .collect();
+        [words[0], words[1]]
+    };
+    let rows = digits.lines().skip(3).filter(|l| !l.trim().is_empty());
+    let mut nodes = 0;
+    for row in rows {
+        let words: Vec<&str> = row.split_whitespace().collect();
+        let [x, y] = place(words[0]);
+        let [mut u, mut v]: [f64; 2] = [1, 2].map(|k| words[k].parse().unwrap());
+        if words.last() == Some(&"L") {
+            let r = x.hypot(y);
+            (u, v) = ((u * x - v * y) / r, (u * y + v * x) / r);
+        }
+        let near = |at: &&([f64; 2], [f64; 2])| (at.0[0] - x).hypot(at.0[1] - y) < 1e-9;
+        let (_, found) = frame.iter().find(near).unwrap();
+        // half a unit of the seventh digit, and round-off of its solver
+        let off = (found[0] - u).abs().max((found[1] - v).abs());
+        assert!(off < 5.1e-9, "{row}: {found:?}");
+        nodes += 1;
+    }
+    assert_eq!(nodes, 29);
+}
+
+/// Places and displacements of the points of a plane body.
+fn mesh_of(path: &std::path::Path) -> Vec<([f64; 2], [f64; 2])> {
+    let DataSet::UnstructuredGrid { pieces, .. } = Vtk::import(path).unwrap().data else {
+        panic!("no cells");
+    };
+    let piece = pieces.into_iter().next().unwrap();
+    let piece = piece.into_loaded_piece_data(Some(path)).unwrap();
+    let displacement = piece
+        .data
+        .point
+        .iter()
+        .find_map(|attribute| match attribute {
+            Attribute::DataArray(array) if array.name == "displacement" => Some(array.data.clone()),
+            _ => None,
+        });
+    let points: Vec<f64> = piece.points.cast_into().unwrap();
+    let moved: Vec<f64> = displacement.unwrap().cast_into().unwrap();
+    let pairs = points.chunks_exact(3).zip(moved.chunks_exact(3));
+    pairs.map(|(x, u)| ([x[0], x[1]], [u[0], u[1]])).collect()
 }

@@ -1,6 +1,6 @@
 //! Triangles and tetrahedra of second order that a rim cuts: they keep their order, with straight sides, and have positive masses.
 
-use bondline::{Material, Region, Silent};
+use bondline::{CellShape, Condition, Initial, Material, Region, Silent};
 
 use super::meshes::{Body, Random, raised};
 use super::quadrilaterals::{assert_affine, told};
@@ -134,4 +134,51 @@ fn a_bar_two_tetrahedra_wide_bends_as_without_a_zone() {
         (coupled / elements - 1.0).abs() < 0.005,
         "{coupled} {elements}"
     );
+}
+
+/// A plate under a uniform stress that begins in equilibrium stays there, though loads are handed on by other weights than masses.
+#[test]
+fn a_plate_in_equilibrium_stays_at_rest_in_time() {
+    let (stress, nu) = (0.01, 0.3);
+    for (k, coupling) in ["splice", "truncated"].into_iter().enumerate() {
+        for shape in [CellShape::Tri6, CellShape::Quad8] {
+            let body = Body::<2> {
+                size: [24.0, 17.0],
+                edge: 2.3,
+                seed: 1460 + k as u64,
+            };
+            let mut random = Random::new(body.seed);
+            let plain = match shape {
+                CellShape::Tri6 => body.mesh(),
+                _ => body.boxes(0.2, 0.0),
+            };
+            let mesh = raised(plain, 0.0, &mut random);
+            let motion = scene(&body, &mut random)
+                .mesh(mesh)
+                .nonlocal(Region::cuboid([9.0, 4.0], [17.0, 17.0]))
+                .set("zones.skin", "free-surfaces")
+                .material("body", Material::lps(1.0, nu).density(2.0))
+                .horizon(2.0)
+                .coupling(coupling)
+                .condition("left", Condition::traction("left").x(-stress))
+                .condition("right", Condition::traction("right").x(stress))
+                .initial(
+                    "start",
+                    Initial::displacement()
+                        .x(format!("{stress} * x").as_str())
+                        .y(format!("{} * y", -nu * stress).as_str()),
+                )
+                .explicit(40.0)
+                .solve(&Silent)
+                .unwrap();
+            let kinetic = motion.history("kinetic_energy").unwrap();
+            let largest = kinetic.iter().copied().fold(0.0, f64::max);
+            let stored = 0.5 * stress * stress * body.volume();
+            println!("{coupling} {shape:?}: {:e}", largest / stored);
+            assert!(
+                largest < 1e-18 * stored,
+                "{coupling} {shape:?}: {largest:e}"
+            );
+        }
+    }
 }

@@ -182,12 +182,18 @@ struct TradeArguments {
     /// A key of the scene with other values: 'solver.tolerance=[1e-4, 1e-8]'.
     #[arg(long, value_name = "KEY=[...]", value_parser = pareto::typed)]
     vary: Vec<pareto::Knob>,
-    /// Quantities to compare: displacement, strain, reaction, energy, history.COLUMN, path.TIP, tip-time.TIP; those that suit the outputs if left out.
-    #[arg(long = "quantity", value_name = "NAME", value_delimiter = ',', value_parser = pareto::Quantity::parse)]
-    quantities: Vec<pareto::Quantity>,
-    /// Reference of the comparison: full peridynamics, or half the horizon and spacing; by default the first where cracks run, else the second.
-    #[arg(long, value_enum)]
-    reference: Option<ReferenceName>,
+    /// A relative error that is wanted, of a quantity or of those that suit the outputs: probe:tip.u=1%, reaction=2%, 1%. May be given several times.
+    #[arg(
+        long = "want",
+        value_name = "QUANTITY=ERROR",
+        value_delimiter = ',',
+        value_parser = pareto::Want::parse,
+        default_value = "1%"
+    )]
+    wants: Vec<pareto::Want>,
+    /// Reference of the comparison: full-pd (peridynamics everywhere), fe (elements alone, half as large, or those of a mesh file of second order), finer (half the horizon and spacing; half the spacing where cracks run), or another scene file. If left out full-pd where bonds break in time, fe where nothing breaks on the mesh of a file, else finer.
+    #[arg(long, value_name = "NAME|FILE", value_parser = reference)]
+    reference: Option<Reference>,
     /// A key of the reference, instead of --reference.
     #[arg(
         long = "reference-set",
@@ -198,14 +204,6 @@ struct TradeArguments {
     /// Measure of the cost of a case.
     #[arg(long, value_enum, default_value = "time")]
     cost: CostName,
-    /// Relative errors for which the cheapest case is wanted, and written as a scene.
-    #[arg(
-        long,
-        value_name = "ERROR",
-        value_delimiter = ',',
-        default_value = "0.05,0.01"
-    )]
-    wanted: Vec<f64>,
     /// Time for all cases together: 90s, 10min, 2h.
     #[arg(long, value_name = "TIME", default_value = "10min")]
     budget: Pace,
@@ -217,12 +215,18 @@ struct TradeArguments {
     quiet: bool,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum ReferenceName {
-    /// Peridynamics everywhere.
-    FullPd,
-    /// Half the horizon and spacing; half the spacing where cracks run.
-    Finer,
+/// The reference of a trade, as typed.
+fn reference(text: &str) -> Result<Reference, String> {
+    match text {
+        "full-pd" => Ok(Reference::FullPd),
+        "fe" => Ok(Reference::Elements),
+        "finer" => Ok(Reference::Finer),
+        path if path.ends_with(".toml") => Ok(Reference::Scene(PathBuf::from(path))),
+        _ => Err(
+            "possible values: full-pd, fe, finer, or a scene file, whose name ends with .toml"
+                .to_owned(),
+        ),
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -542,10 +546,9 @@ fn traded(arguments: TradeArguments, program: std::io::Result<PathBuf>) -> miett
         overrides: arguments.scene.overrides,
         knobs: arguments.knobs,
         vary: arguments.vary,
-        quantities: arguments.quantities,
+        wants: arguments.wants,
         reference: match arguments.reference {
-            Some(ReferenceName::FullPd) => Reference::FullPd,
-            Some(ReferenceName::Finer) => Reference::Finer,
+            Some(reference) => reference,
             None if arguments.reference_keys.is_empty() => Reference::Auto,
             None => Reference::Keys(arguments.reference_keys),
         },
@@ -554,7 +557,6 @@ fn traded(arguments: TradeArguments, program: std::io::Result<PathBuf>) -> miett
             CostName::Memory => CostBy::Memory,
             CostName::BondVisits => CostBy::BondVisits,
         },
-        wanted: arguments.wanted,
         budget,
     };
     let program = program.map_err(|e| miette::miette!("cannot find this program: {e}"))?;
@@ -570,15 +572,6 @@ fn traded(arguments: TradeArguments, program: std::io::Result<PathBuf>) -> miett
     let files = found.write(&params).map_err(|e| miette::miette!("{e}"))?;
     if !arguments.quiet {
         print(&found)?;
-        for &wanted in &params.wanted {
-            print(match found.cheapest(wanted) {
-                Some(case) => format!(
-                    "cheapest with an error of at most {wanted}: {}",
-                    case.name()
-                ),
-                None => format!("no case has an error of at most {wanted}"),
-            })?;
-        }
     }
     for file in files {
         print(file.display())?;

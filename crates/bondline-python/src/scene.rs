@@ -108,6 +108,12 @@ impl Scene {
         &self.name
     }
 
+    /// The names of the probes in the order in which they are typed.
+    #[getter]
+    fn probes(&self) -> Vec<String> {
+        self.source.typed_keys(&["output", "probes"])
+    }
+
     /// The scene as one TOML text.
     fn text(&self, py: Python<'_>) -> PyResult<String> {
         let table = self.source.table().map_err(|e| scene_error(py, e))?;

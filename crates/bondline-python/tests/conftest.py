@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[3]
 BAR: dict[str, Any] = {
     "kinematics": "bar",
     "mesh": {"line": {"min": 0, "max": 1, "x": {"cells": 50}}},
-    "materials": {"bar": {"bond-based": {"youngs-modulus": 2.0, "micromodulus": "constant"}}},
+    "materials": {"bar": {"bond-based": {"youngs-modulus": 2.0, "micromodulus": "inverted-triangular"}}},
     "peridynamics": {"horizon": 0.06, "points": {"lattice": {"spacing": 0.02}}},
     "zones": {"nonlocal": {"box": {"min": 0.4, "max": 0.6}}},
     "coupling": "truncated",
@@ -35,7 +35,7 @@ PULSE: dict[str, Any] = {
     "kinematics": "bar",
     "mesh": {"line": {"min": 0, "max": 100, "x": {"cells": 400}}},
     "materials": {
-        "bar": {"bond-based": {"youngs-modulus": 1, "density": 1, "micromodulus": "constant"}}
+        "bar": {"bond-based": {"youngs-modulus": 1, "density": 1, "micromodulus": "inverted-triangular"}}
     },
     "peridynamics": {"horizon": 0.75, "points": {"lattice": {"spacing": 0.25}}},
     "zones": {"nonlocal": {"box": {"min": 60, "max": 80}}},

@@ -122,6 +122,6 @@ def linear(x: Any) -> Any:
 def test_a_sweep_takes_functions_of_modules() -> None:
     keys = copy.deepcopy(BAR)
     with pytest.raises(ValueError, match="module"):
-        bondline.sweep(keys, "conditions.pull.body-force.x", [lambda x: x])
-    found = bondline.sweep(keys, "conditions.pull.body-force.x", [linear, "2e-3 * x"])
+        bondline.sweep(keys, {"conditions.pull.body-force.x": [lambda x: x]})
+    found = bondline.sweep(keys, {"conditions.pull.body-force.x": [linear, "2e-3 * x"]}).results()
     assert np.allclose(2 * found[0].displacement, found[1].displacement)

@@ -115,6 +115,27 @@ def test_sets_of_edges_cells_and_points_are_known() -> None:
     assert np.abs(result.displacement[:, 0]).max() < 1e-14
 
 
+def test_what_a_run_gives_is_a_mesh_again() -> None:
+    first = bondline.Scene.from_dict(keys(), mesh=bondline.Mesh.from_meshio(square())).run(progress=False)
+    plain = {key: of for key, of in keys().items() if key in ("kinematics", "coupling")}
+    # arrays of a result, with the field as a function of the place: the same displacement, everywhere
+    at = {tuple(x): u for x, u in zip(np.round(first.points[:, :2], 9).tolist(), first.displacement[:, 1].tolist())}
+
+    def known(x: np.ndarray[Any, Any], y: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        return np.array([at[place] for place in zip(np.round(x, 9).tolist(), np.round(y, 9).tolist())])
+
+    second = bondline.Scene.from_dict(
+        plain
+        | {
+            "materials": {"all": {"lps": {"youngs-modulus": 1, "poisson-ratio": 0}}},
+            "conditions": {"all": {"displacement": {"inside": {"everywhere": True}, "x": 0, "y": known}}},
+        },
+        mesh=bondline.Mesh.from_meshio(first.to_meshio()),
+    ).run(progress=False)
+    assert np.array_equal(second.points, first.points)
+    assert second.displacement[:, 1] == pytest.approx(first.displacement[:, 1], abs=1e-15)
+
+
 def test_a_mesh_of_ones_own() -> None:
     plain = square()
     offset = len(plain.cells[0].data)

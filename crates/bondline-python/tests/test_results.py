@@ -63,6 +63,35 @@ def test_a_pulse_over_time(pulse: dict[str, Any]) -> None:
     assert np.array_equal(last.displacement, result.displacement)
 
 
+def test_probes_have_names_in_the_order_in_which_they_are_typed(bar: dict[str, Any], pulse: dict[str, Any], tmp_path: Path) -> None:
+    places = {"tip": 1.0, "middle": 0.5, "a": 0.25}
+    bar["output"]["probes"] = {name: {"at": at} for name, at in places.items()}
+    result = bondline.run(bar, progress=False)
+    assert list(result.probes) == ["tip", "middle", "a"]
+    for name, at in places.items():
+        assert result.probes[name]["x"] == at and result.probes[name]["ux"] == pytest.approx(5e-4 * at, abs=1e-15)
+    # of a file, too
+    text = """kinematics = "bar"
+coupling = "local"
+mesh.line = { min = 0, max = 1, x = { cells = 4 } }
+materials.bar.bond-based.youngs-modulus = 2.0
+conditions.left.displacement = { on = "left", x = 0 }
+conditions.right.traction = { on = "right", x = 1e-3 }
+[output]
+probes.tip = { at = 1 }
+probes.middle = { at = 0.5 }
+"""
+    (tmp_path / "bar.toml").write_text(text)
+    of_file = bondline.Scene.load(tmp_path / "bar.toml", overrides={"output.probes.a": {"at": 0.25}}).run(progress=False)
+    assert {name: of["ux"] for name, of in of_file.probes.items()} == pytest.approx({"tip": 5e-4, "middle": 2.5e-4, "a": 1.25e-4})
+    assert list(of_file.probes) == ["tip", "middle", "a"]
+    # over time: columns of the history
+    pulse["output"]["probes"] = {"within": {"at": 70}, "within_a": {"at": 50}}
+    moving = bondline.run(pulse, progress=False)
+    assert list(moving.probes) == ["within", "within_a"] and set(moving.probes["within"]) == {"ux", "vx"}
+    assert np.array_equal(moving.probes["within_a"]["ux"], moving.history["within_a_ux"])
+
+
 def test_files_hold_the_same(pulse: dict[str, Any], tmp_path: Path) -> None:
     result = bondline.Scene.from_dict(pulse, name="pulse").run(progress=False, output=tmp_path)
     files = sorted(tmp_path.glob("pulse_*.vtu"))

@@ -197,12 +197,10 @@ fn solve_dimension<const D: usize>(
 ) -> Result<Bar, RunError> {
     let (low, high) = scene.mesh.bounds();
     let section: f64 = (1..D).map(|a| high[a] - low[a]).product();
-    let youngs_modulus = scene.materials.first().map_or(f64::NAN, |m| {
-        let (lambda, mu) = m.lame;
-        match D {
-            1 => lambda + 2.0 * mu,
-            _ => mu * (3.0 * lambda + 2.0 * mu) / (lambda + mu),
-        }
+    let lame = scene.materials.first().and_then(|m| m.lame());
+    let youngs_modulus = lame.map_or(f64::NAN, |(lambda, mu)| match D {
+        1 => lambda + 2.0 * mu,
+        _ => mu * (3.0 * lambda + 2.0 * mu) / (lambda + mu),
     });
     let half = STRETCH * high[0].abs().max(low[0].abs());
     let mut planes = Vec::new();

@@ -99,7 +99,7 @@ impl<const D: usize> RandomCloud<D> {
                 self.position.len(),
                 (0..self.position.len() as u32).map(|s| vec![(s, 1.0)]),
             ),
-            material: Vec::new(),
+            ..Cloud::default()
         };
         PdBody::new(
             cloud,
@@ -211,6 +211,7 @@ fn position_aware_density<const D: usize>(
         volumes: &volumes,
         factors: &base,
         horizon,
+        bond_horizons: &[],
         materials: None,
     };
     let fit = position_aware_influence::fit(&family, &base, CalibrationFields::Axes);

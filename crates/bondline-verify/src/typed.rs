@@ -217,7 +217,7 @@ fn micromodulus(kernel: Micromodulus) -> String {
     match kernel {
         Micromodulus::InverseDistance => "\"inverse-distance\"".to_owned(),
         Micromodulus::Uniform => "\"uniform\"".to_owned(),
-        Micromodulus::Constant => "\"constant\"".to_owned(),
+        Micromodulus::Constant => "\"inverted-triangular\"".to_owned(),
         Micromodulus::Triangular => "\"triangular\"".to_owned(),
         Micromodulus::Influence(w) => format!("{{ influence = {} }}", influence(w)),
     }

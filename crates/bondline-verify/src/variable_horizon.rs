@@ -161,7 +161,7 @@ fn bar_scene<const D: usize>(
     // partial stress everywhere but at one end, out of reach of what is looked at: a scene has a nonlocal zone
     let last = std::array::from_fn(|k| if k == 0 { half[0] - SMALL } else { -half[k] });
     format!(
-        "kinematics = \"{}\"\ncoupling = {}\n{}{}{rest}[peridynamics]\nhorizon = \"{horizon}\"\npoints.lattice = {{ spacing = {spacing:?}, origin = {} }}\n{}{}[zones]\nnonlocal = {}\ntransition = {{ everywhere = true }}\n{}",
+        "kinematics = \"{}\"\ncoupling = {}\n{}{}{rest}[peridynamics]\nhorizon = \"{horizon}\"\npoints.lattice = {{ spacing = {spacing:?}, origin = {} }}\nvolumes = \"full\"\n{}{}[zones]\nnonlocal = {}\ntransition = {{ everywhere = true }}\n{}",
         typed::kinematics::<D>(),
         model.coupling(),
         typed::grid(

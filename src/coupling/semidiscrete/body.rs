@@ -13,10 +13,10 @@ use crate::coupling::semidiscrete::pass_input::{
 use crate::{
     assembly::{Row, Transfer},
     coupling::{NonlinearSeam, Operator},
-    model::Model,
+    model::{HorizonChange, Model, Peridynamics},
     parallel,
     peridynamics::{
-        Families, PdBody,
+        Accelerator, Families, PdBody,
         bond_force::{BondKinematics, BondPass},
         contact::{Contact, ContactSetup, contact_stiffness},
     },
@@ -83,6 +83,25 @@ fn contact_of<const D: usize>(
     Ok(contact)
 }
 
+/// Returns, for each point, true if it may lose bonds: those with a row of the body, and those that continue a lattice, which lose what the points there would lose.
+fn breaking_points<const D: usize>(model: &Model<D>, own_row: &[bool]) -> Vec<bool> {
+    let mut breaks = own_row.to_vec();
+    for &point in &model.points.continued {
+        breaks[point as usize] = true;
+    }
+    breaks
+}
+
+/// The fast pass of the law, if it knows all of the bonds: those of a solid have one weight from both ends.
+fn accelerator<const D: usize>(
+    p: &Peridynamics<D>,
+    behaviour: &BondBehaviour<'_, D>,
+    is_dual: bool,
+) -> Option<Accelerator> {
+    let known = p.accelerator().filter(|_| behaviour.suits_accelerators());
+    known.filter(|accelerator| !is_dual || *accelerator == Accelerator::Pairwise)
+}
+
 impl<const D: usize> MovingBody<D> {
     pub fn new(
         model: &Model<D>,
@@ -105,11 +124,13 @@ impl<const D: usize> MovingBody<D> {
         for &foot in &model.points.feet {
             has_force[foot as usize] = true;
         }
+        let breaks = breaking_points(model, &own_row);
         let no_fail: Vec<bool> = parallel::map(points, 1, |i| {
-            !own_row[i] || (behaviour.no_fail)(&body.cloud.position[i])
+            !breaks[i] || (behaviour.no_fail)(&body.cloud.position[i])
         });
+        let is_dual = p.horizon_change == HorizonChange::Dual && body.mixes_horizons();
         let passed = match seam {
-            None => passed_families(model, operator, body, &own_row),
+            None => passed_families(model, operator, body, &own_row, is_dual),
             Some(_) => None,
         };
         let families = match (seam, &passed) {
@@ -119,16 +140,14 @@ impl<const D: usize> MovingBody<D> {
         };
         let all_pass = seam.is_none() && passed.is_none();
         let may_break = behaviour.failure.is_some() || p.law.damages();
-        let edge = if may_break && seam.is_none() {
-            edge_of(body, &own_row)
-        } else {
-            Vec::new()
-        };
+        let has_edge = may_break && seam.is_none();
+        let edge = has_edge.then(|| edge_of(body, &own_row, &breaks));
         let holders = Holders::of(model, families, ranks);
         let mut pass = PassInput {
             body,
             law: &p.law,
-            accelerator: p.accelerator().filter(|_| behaviour.suits_accelerators()),
+            accelerator: accelerator(p, behaviour, is_dual),
+            is_dual,
             families,
             is_whole: all_pass,
             rows: &has_force,
@@ -159,10 +178,15 @@ impl<const D: usize> MovingBody<D> {
             feet: model.points.feet.clone(),
             passed,
             alone: own_row.iter().filter(|own| **own).count(),
-            edge,
+            edge: edge.unwrap_or_default(),
             displacement: vec![0.0; points * D],
             force: vec![0.0; points * D],
         }))
+    }
+
+    /// The families that the pass traverses, where no seam has bonds of its own.
+    pub fn traversed<'a>(&'a self, body: &'a PdBody<D>) -> &'a Families {
+        self.passed.as_ref().unwrap_or(&body.families)
     }
 
     /// Returns true if the pass traverses the bond between two points, where no seam has bonds of its own.

@@ -8,7 +8,7 @@ use crate::{
     },
     model::SiteKind,
     peridynamics::{
-        Accelerator, Families, Law, PdBody,
+        Accelerator, BondHorizon, Families, Law, PdBody,
         bond_force::{
             BondCriterion, BondForce, BondPass, BondSetup, DistributedRows, Failure, Layout,
             Storage, bond_pass,
@@ -25,6 +25,8 @@ pub(super) struct PassInput<'a, const D: usize> {
     pub law: &'a Arc<dyn Law<D>>,
     /// The fast pass that the law and its weights have.
     pub accelerator: Option<Accelerator>,
+    /// True if points of different horizons have bonds that act at both ends by what either end gives them, [`crate::model::HorizonChange::Dual`].
+    pub is_dual: bool,
     pub families: &'a Families,
     /// True if the families are those of the body.
     pub is_whole: bool,
@@ -58,11 +60,15 @@ impl<const D: usize> PassInput<'_, D> {
             true => body.kernel(i).0[k],
             false => body.coefficients(i, families.of(i)[k]).0,
         };
+        let mean = |i: usize, k: usize, _: &Vector<D>| 0.5 * self.ends(i, k).iter().sum::<f64>();
         let omega = |i: usize, k: usize, _: &Vector<D>| match is_all_of(i) {
             true => body.kernel(i).1[k],
             false => body.coefficients(i, families.of(i)[k]).1,
         };
         let force = match (self.accelerator, law.force_state()) {
+            (Some(Accelerator::Pairwise), _) if self.is_dual => {
+                BondForce::Pairwise { coefficient: &mean }
+            }
             (Some(Accelerator::Pairwise), _) => BondForce::Pairwise { coefficient: &pair },
             (Some(Accelerator::Solid { bulk, shear }), _) => BondForce::Solid {
                 omega: &omega,
@@ -72,12 +78,7 @@ impl<const D: usize> PassInput<'_, D> {
             (None, Some(_)) => BondForce::Law { law, body },
             (None, None) => return Err(SystemError::Law { law: law.name() }),
         };
-        let material = |p: usize| body.cloud.material.get(p).copied().unwrap_or(0);
-        let by_bond = |i: usize, k: usize, _: &Vector<D>| {
-            let materials = [material(i), material(families.of(i)[k] as usize)];
-            let at = |c: &BondThreshold| c.at(body.cloud.horizon.lattice_of(i), materials);
-            behaviour.failure.as_ref().map_or(f64::INFINITY, at)
-        };
+        let by_bond = |i: usize, k: usize, _: &Vector<D>| self.threshold(i, k);
         let broken = behaviour
             .broken
             .filter(|b| !b.is_empty())
@@ -114,6 +115,43 @@ impl<const D: usize> PassInput<'_, D> {
         })?;
         Ok(pass)
     }
+
+    /// What either end gives a bond, the own one first: a bond that acts alone has the mean of both. One behind which no family is, is the same from there.
+    fn ends(&self, i: usize, k: usize) -> [f64; 2] {
+        let j = self.families.of(i)[k];
+        let own = self.body.coefficients(i, j).0;
+        match self.families.of(j as usize).is_empty() {
+            true => [own; 2],
+            false => [own, self.body.coefficients(j as usize, i as u32).0],
+        }
+    }
+
+    /// The stretch that breaks a bond; infinite where none does.
+    fn threshold(&self, i: usize, k: usize) -> f64 {
+        let cloud = &self.body.cloud;
+        let j = self.families.of(i)[k] as usize;
+        let material = |p: usize| cloud.material.get(p).copied().unwrap_or(0);
+        let at = |end: usize| {
+            let lattice = cloud.horizon.lattice_of(end);
+            let of_lattice = |c: &BondThreshold| c.at(lattice, [material(i), material(j)]);
+            (self.behaviour.failure.as_ref()).map_or(f64::INFINITY, of_lattice)
+        };
+        match cloud.bond_horizon {
+            BondHorizon::Larger if cloud.horizon.of(j) > cloud.horizon.of(i) => at(j),
+            _ if self.is_dual => dual_stretch([at(i), at(j)], self.ends(i, k)),
+            BondHorizon::Larger | BondHorizon::OfCentre => at(i),
+        }
+    }
+}
+
+/// The stretch that breaks a bond whose ends have different horizons: its energy is then that at which its halves `p` would break at the stretches of either end.
+fn dual_stretch([s, t]: [f64; 2], [p, q]: [f64; 2]) -> f64 {
+    if s == t || p + q <= 0.0 {
+        return s.min(t);
+    }
+    // the lower one first: both ends have the same number
+    let (a, b) = (p * s * s, q * t * t);
+    ((a.min(b) + a.max(b)) / (p + q)).sqrt()
 }
 
 /// Distribution of the traversed families, where they are spread over processes: the points that this process reports, and the number of bonds of each point.
@@ -147,26 +185,37 @@ impl<'a> Holders<'a> {
     }
 }
 
-/// The traversed families, where rows keep some bonds of their points to themselves.
+/// The traversed families, where rows keep some bonds of their points to themselves, or where either end of a bond has its own horizon: such a bond stands in both families then.
 pub(super) fn passed_families<const D: usize>(
     model: &Model<D>,
     operator: &Operator<'_, D>,
     body: &PdBody<D>,
     own_row: &[bool],
+    is_dual: bool,
 ) -> Option<Families> {
     let has_bonds = |site: usize| operator.bonds_of_site(site) == BondsOfSite::Among;
-    (0..model.sites.len()).any(has_bonds).then(|| {
-        let mut passed = body.families.clone();
-        passed.retain_of(|i| !own_row[i], |i, j| operator.holds_bond(i, j as usize));
+    let lacks_some = (0..model.sites.len()).any(has_bonds);
+    (lacks_some || is_dual).then(|| {
+        let mut passed = match is_dual {
+            true => body.families.completed(),
+            false => body.families.clone(),
+        };
+        if lacks_some {
+            passed.retain_of(|i| !own_row[i], |i, j| operator.holds_bond(i, j as usize));
+        }
         passed.mirrored(&model.points.feet)
     })
 }
 
-/// Points with a row of the body whose families reach beyond those.
-pub(super) fn edge_of<const D: usize>(body: &PdBody<D>, own_row: &[bool]) -> Vec<u32> {
+/// Points with a row of the body whose families reach beyond the points that lose bonds.
+pub(super) fn edge_of<const D: usize>(
+    body: &PdBody<D>,
+    own_row: &[bool],
+    breaks: &[bool],
+) -> Vec<u32> {
     let leaves = |i: usize| {
         let mut family = body.families.of(i).iter();
-        family.any(|&j| !own_row[j as usize])
+        family.any(|&j| !breaks[j as usize])
     };
     let all = 0..own_row.len() as u32;
     all.filter(|&i| own_row[i as usize] && leaves(i as usize))

@@ -95,12 +95,19 @@ impl<const D: usize> CoupledSystem<'_, D> {
         let (Some(moving), Some(body)) = (self.body.as_ref(), self.model.body()) else {
             return Vec::new();
         };
-        let site = |p: usize| moving.site_of_point[p];
+        // a point that continues a lattice where that of another has a point stands for this
+        let site = |p: usize| match (moving.site_of_point[p], &moving.transfer) {
+            (NONE, Some(transfer)) if self.model.continues_on(p as u32) => {
+                transfer.site(p).unwrap_or(NONE)
+            }
+            (site, _) => site,
+        };
+        let families = moving.traversed(body);
         parallel::listed(moving.site_of_point.len(), 1, |i, all| {
-            if site(i) == NONE || !moving.pass.is_damaged(i) {
+            if moving.site_of_point[i] == NONE || !moving.pass.is_damaged(i) {
                 return;
             }
-            let lost = body.families.of(i).iter().filter(|&&j| {
+            let lost = families.of(i).iter().filter(|&&j| {
                 !moving.pass.bonded(i, j as usize)
                     && site(j as usize) != NONE
                     && self.is_passed_over(i, j)

@@ -25,6 +25,7 @@ pub(super) fn join(reader: &Reader) -> Result<RawMesh, MeshError> {
         dimension: 0,
         gaps: Vec::new(),
     };
+    join.instances();
     join.nodes();
     join.elements()?;
     join.check_sections()?;
@@ -77,6 +78,18 @@ struct Join<'r, 'a> {
 }
 
 impl Join<'_, '_> {
+    /// Keeps the names of instances, if there are several bodies with nodes.
+    fn instances(&mut self) {
+        let bodies = self.reader.bodies.iter().zip(&self.offsets);
+        let with_nodes = bodies.filter(|(body, _)| !body.nodes.is_empty());
+        let all: Vec<(u64, String)> = with_nodes
+            .map(|(body, &offset)| (offset, body.name.clone()))
+            .collect();
+        if all.len() > 1 {
+            self.raw.instances = all;
+        }
+    }
+
     fn nodes(&mut self) {
         for (body, &offset) in self.reader.bodies.iter().zip(&self.offsets) {
             for node in &body.nodes {

@@ -144,7 +144,14 @@ struct Whole {
 
 impl Whole {
     fn add(&mut self, path: &Path) -> Result<(), MeshError> {
-        let bytes = bytes_of(path)?;
+        let mut bytes = bytes_of(path)?;
+        if !bytes.contains(&b'\n') {
+            // lines of some editors end in a carriage return alone
+            bytes
+                .iter_mut()
+                .filter(|b| **b == b'\r')
+                .for_each(|b| *b = b'\n');
+        }
         let source = Source {
             path: path.into(),
             bytes: &bytes,

@@ -2,8 +2,9 @@
 
 use crate::mesh::{Mesh, boundary::BoundaryFacet};
 use crate::model::{
-    Bins, CellRole, ModelError, Peridynamics, Zone, completed_lattice::CompletedLattice,
-    point_cloud::PointCloud,
+    Bins, CellRole, ModelError, Peridynamics, Zone,
+    completed_lattice::CompletedLattice,
+    point_cloud::{PointCarrier, PointCloud},
 };
 use crate::peridynamics::{Cloud, Ends, Factors, Families, FamilyEnds, PdBody};
 use crate::tensor::{Vector, inverse};
@@ -70,14 +71,14 @@ pub(crate) fn place<const D: usize>(
     let of_face = |face: &BoundaryFacet| (places(mesh, face, h), mesh.facet_normal_area(face));
     let places: Vec<_> = faces.iter().map(of_face).collect();
     let close = TooClose::new(&places, h);
-    let in_zone = |i: &u32| whole.cloud.element[*i as usize].is_none();
+    let in_zone = |i: &u32| whole.cloud.carrier[*i as usize].is_own();
     let in_zone = (0..body.cloud.position.len() as u32).filter(in_zone);
     let (left_out, own): (Vec<u32>, Vec<u32>) =
         in_zone.partition(|&i| close.holds(&whole.cloud.position[i as usize]));
     let left_out = left_out.iter().map(|&i| whole.cloud.position[i as usize]);
     let (sums, is_whole) = sums(&body);
     // what surfaces of the body do to families in elements is nothing to the points
-    let is_inside = |j: usize| is_whole[j] || whole.cloud.element[j].is_some();
+    let is_inside = |j: usize| is_whole[j] || !whole.cloud.carrier[j].is_own();
     let wanted = |i: usize| {
         let mut family = body.families.of(i).iter();
         match is_whole[i] && family.all(|&j| is_inside(j as usize)) {
@@ -99,7 +100,8 @@ pub(crate) fn place<const D: usize>(
     let volume = cloud.spacing.powi(D as i32);
     for (face, (places, _)) in feet.faces.iter().zip(places) {
         for (x, shape) in places {
-            cloud.push(x, volume, Zone::Local, Some((face.cell, shape)));
+            let carrier = PointCarrier::Element(face.cell, shape);
+            cloud.push(x, volume, Zone::Local, carrier);
         }
     }
     cloud.horizon = p.horizon.of_points(&cloud.position);
@@ -115,6 +117,7 @@ pub(crate) fn place<const D: usize>(
         factors: whole.factors,
         wide: None,
         is_constant: true,
+        interaction: None,
         shared: None,
         held: None,
     };
@@ -218,7 +221,12 @@ fn own_points<const D: usize>(whole: &PointCloud<D>, own: &[u32]) -> PointCloud<
     cloud.axes = whole.axes;
     for &i in own {
         let i = i as usize;
-        cloud.push(whole.position[i], whole.volume[i], whole.zone[i], None);
+        cloud.push(
+            whole.position[i],
+            whole.volume[i],
+            whole.zone[i],
+            PointCarrier::Own,
+        );
     }
     cloud
 }

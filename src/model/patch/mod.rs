@@ -4,7 +4,8 @@
 //! |---|---|
 //! | `places.rs` | places that a scene wants, holds, and keeps a patch off |
 //! | `cells.rs` | cells of the zone, the rim around them, and the faces Γ of the rim |
-//! | `replaced.rs` | cells of second order that the patch meets, with straight sides, and linear but for simplices at rest; quadrilaterals and hexahedra that it cuts, divided |
+//! | `halves.rs` | quadrilaterals of second order that the patch cuts, in two triangles |
+//! | `replaced.rs` | cells of second order that the patch meets, with straight sides, and linear but for simplices; quadrilaterals and hexahedra that it cuts, divided |
 //! | `cuts.rs` | elements that Γ cuts: what is left of them |
 //! | `plane_parts.rs` | plane parts of Γ, in an order in which rows of their nodes resolve |
 //! | `tie.rs` | the displacement of the nodes of Γ, by a dual mortar |
@@ -33,6 +34,7 @@ mod composite;
 mod cuts;
 mod error;
 mod followers;
+mod halves;
 mod left;
 mod moments;
 mod places;
@@ -55,6 +57,7 @@ use self::{
     cells::PatchCells,
     composite::Composite,
     cuts::Cuts,
+    halves::Halves,
     rows::{Place, Rows, mass_row, row_of_cell},
     sides::Sides,
     tie::Tied,
@@ -107,6 +110,41 @@ pub fn embed<const D: usize>(
     places: Places<'_, D>,
     material: &dyn Fn(u32) -> u16,
 ) -> Result<Patched<D>, PatchError> {
+    let mut halves = Halves::none(mesh);
+    loop {
+        let is_held = |n| halves.is_held(n, &places);
+        let own = Places {
+            is_held: &is_held,
+            ..places
+        };
+        let of_cell = |c| material(halves.origin(c));
+        match embedded_by_some_way(&halves.mesh, lattice, own, &of_cell)? {
+            Found::ToHalve(cells) => halves.halve(&cells),
+            Found::Patched(mut patched) => {
+                for c in &mut patched.origin {
+                    *c = halves.origin(*c);
+                }
+                patched.replaced.halved = halves.count();
+                return Ok(*patched);
+            }
+        }
+    }
+}
+
+/// Outcome of embedding a patch.
+enum Found<const D: usize> {
+    Patched(Box<Patched<D>>),
+    /// Quadrilaterals of second order that the patch cuts.
+    ToHalve(Vec<u32>),
+}
+
+/// The same by the first way to let the patch grow that succeeds.
+fn embedded_by_some_way<const D: usize>(
+    mesh: &Mesh<D>,
+    lattice: PatchLattice<D>,
+    places: Places<'_, D>,
+    material: &dyn Fn(u32) -> u16,
+) -> Result<Found<D>, PatchError> {
     let orders: &[bool] = if D == 3 { &[false, true] } else { &[false] };
     // at rest no node needs a mass
     let takes_strips: &[bool] = if lattice.has_masses {
@@ -149,7 +187,7 @@ fn grown<const D: usize>(
     places: Places<'_, D>,
     material: &dyn Fn(u32) -> u16,
     growth: Growth,
-) -> Result<Patched<D>, PatchError> {
+) -> Result<Found<D>, PatchError> {
     let cells = lattice.cells(&mesh.bounds().0);
     let width = 1 + (lattice.reach / cells.spacing - 1e-6).ceil() as i32;
     // at least one spacing of it
@@ -165,7 +203,10 @@ fn grown<const D: usize>(
     for _ in 0..ABSORBED {
         patch.check_materials(material)?;
         patch.check_connected(mesh)?;
-        let (cut, replaced) = replaced::replaced(mesh, &patch);
+        let (cut, replaced) = match replaced::replaced(mesh, &patch) {
+            Ok(found) => found,
+            Err(quadrilaterals) => return Ok(Found::ToHalve(quadrilaterals)),
+        };
         let cuts = Cuts::new(cut.as_ref(), &patch, lattice.has_masses)?;
         let strips = match growth.takes_strips {
             true => cuts.strips(cut.as_ref(), &patch, is_held),
@@ -178,15 +219,19 @@ fn grown<const D: usize>(
             }
         }
         let found = embedded((cut.as_ref(), &cuts), &patch, (is_held, material), lattice);
-        let Err(error) = &found else {
-            return found.map(|patched| Patched {
-                replaced,
-                ..patched
-            });
+        let error = match found {
+            Ok(patched) => {
+                let patched = Patched {
+                    replaced,
+                    ..patched
+                };
+                return Ok(Found::Patched(Box::new(patched)));
+            }
+            Err(error) => error,
         };
         // a strip between the rim and a surface that no element carries: the rim goes to the surface
         if !error.place().is_some_and(|x| patch.absorb(&x)) {
-            return found;
+            return Err(error);
         }
     }
     Err(PatchError::Grown)

@@ -1,6 +1,6 @@
 //! Cells that a patch replaces before it cuts: those of second order that it meets by ones with straight sides, and quadrilaterals and hexahedra by divided ones.
 //!
-//! Simplices with straight sides have polynomials for shape functions, so that the moments of what is left of them give their stiffness. They keep their order. Other cells of second order become linear. The shape functions of general quadrilaterals and hexahedra are no polynomials in space. Divided about their middle they are linear in each part ([`crate::fem`], `divided.rs`), and neighbours that are whole stay as they are.
+//! Simplices with straight sides have polynomials for shape functions, so that the moments of what is left of them give their stiffness. They keep their order. Quadrilaterals are halved before ([`super::halves`]), hexahedra of second order become linear. The shape functions of general quadrilaterals and hexahedra are no polynomials in space. Divided about their middle they are linear in each part ([`crate::fem`], `divided.rs`), and neighbours that are whole stay as they are.
 
 use std::borrow::Cow;
 
@@ -15,21 +15,27 @@ use crate::mesh::{CellShape, IN_PLANE, Mesh};
 pub struct Replaced {
     /// Number of cells of second order that became linear.
     pub linear: usize,
+    /// Number of quadrilaterals of second order that are two triangles each.
+    pub halved: usize,
     /// Distance \[m\] by which nodes in the middle of their edges moved, at most: that of a curved side from a straight one.
     pub moved: f64,
     /// Quadrilaterals and hexahedra that are divided about their middle.
     pub divided: usize,
 }
 
-/// The mesh with what replaces cells that the patch meets; its nodes and cells keep their numbers.
+/// The mesh with what replaces cells that the patch meets; its nodes and cells keep their numbers. Quadrilaterals of second order that have to be halved before, if there are some.
 pub(super) fn replaced<'m, const D: usize>(
     mesh: &'m Mesh<D>,
     patch: &PatchCells<D>,
-) -> (Cow<'m, Mesh<D>>, Replaced) {
+) -> Result<(Cow<'m, Mesh<D>>, Replaced), Vec<u32>> {
     let mut found = Replaced::default();
     let mut mesh = Cow::Borrowed(mesh);
     let met = met(&mesh, patch);
     if mesh.has_quadratic_cells() {
+        let to_halve = cut_cells(&mesh, &met, |shape| shape == CellShape::Quad8);
+        if !to_halve.is_empty() {
+            return Err(to_halve);
+        }
         straighten(mesh.to_mut(), &met, &mut found);
     }
     let divided = to_divide(&mesh, &met);
@@ -37,7 +43,7 @@ pub(super) fn replaced<'m, const D: usize>(
         found.divided = divided.len();
         mesh.to_mut().embedded.divided.extend(divided);
     }
-    (mesh, found)
+    Ok((mesh, found))
 }
 
 /// A cell that the patch meets.
@@ -90,25 +96,41 @@ fn straighten<const D: usize>(mesh: &mut Mesh<D>, met: &[Option<Met>], found: &m
     let is_linear: Vec<bool> = (is_met.iter().zip(&mesh.shapes))
         .map(|(is_met, &shape)| *is_met && !is_simplex(shape))
         .collect();
-    found.linear = is_linear.iter().filter(|c| **c).count();
+    // of those that the patch covers nothing is left
+    let is_left = |c: usize| {
+        let whole = mesh.cell_volume(c).abs();
+        met[c].is_some_and(|met| whole - met.inside > NOTHING * whole)
+    };
+    found.linear = (0..is_linear.len())
+        .filter(|&c| is_linear[c] && is_left(c))
+        .count();
     mesh.linearise(|c| is_linear[c]);
 }
 
 /// Quadrilaterals and hexahedra to divide: all that the patch cuts or touches, if one of them is neither a parallelogram nor a parallelepiped. Cells that share a cut face have to have the same displacement there.
 fn to_divide<const D: usize>(mesh: &Mesh<D>, met: &[Option<Met>]) -> Vec<u32> {
+    let is_kind = |shape| matches!(shape, CellShape::Quad4 | CellShape::Hex8);
+    let cut = cut_cells(mesh, met, is_kind);
+    match cut.iter().all(|&c| has_constant_jacobian(mesh, c as usize)) {
+        true => Vec::new(),
+        false => cut,
+    }
+}
+
+/// Cells of some shapes that the patch cuts or touches.
+fn cut_cells<const D: usize>(
+    mesh: &Mesh<D>,
+    met: &[Option<Met>],
+    is_kind: impl Fn(CellShape) -> bool,
+) -> Vec<u32> {
     let is_cut = |c: &u32| {
         let c = *c as usize;
-        let is_kind = matches!(mesh.shapes[c], CellShape::Quad4 | CellShape::Hex8);
-        let Some(Met { inside, touches }) = met[c].filter(|_| is_kind) else {
+        let Some(Met { inside, touches }) = met[c].filter(|_| is_kind(mesh.shapes[c])) else {
             return false;
         };
         let whole = mesh.cell_volume(c).abs();
         let part = whole - inside;
         part > NOTHING * whole && (touches || inside > NOTHING * whole)
     };
-    let cut: Vec<u32> = (0..met.len() as u32).filter(is_cut).collect();
-    match cut.iter().all(|&c| has_constant_jacobian(mesh, c as usize)) {
-        true => Vec::new(),
-        false => cut,
-    }
+    (0..met.len() as u32).filter(is_cut).collect()
 }

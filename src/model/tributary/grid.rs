@@ -43,6 +43,8 @@ pub(super) struct Grid<'a, const D: usize> {
     model: &'a Model<D>,
     pub cells: Cells<D>,
     sites: FxHashMap<[i32; D], u32>,
+    /// Points that continue the lattice among those of another, whose sites they follow.
+    continued: FxHashMap<[i32; D], u32>,
     /// Points beside faces that the zone was left without.
     left_out: FxHashSet<[i32; D]>,
     elements: OnceLock<Locator<D>>,
@@ -62,10 +64,10 @@ impl<'a, const D: usize> Grid<'a, D> {
         beyond: Beyond,
         counts: impl Fn(&[i32; D]) -> bool,
     ) -> Self {
-        let passing = model.passing();
-        let own = |p: u32| {
-            passing.is_none_or(|passing| usize::from(passing.of_point[p as usize]) == number)
-        };
+        let own = |p: u32| model.lattice_of_point(p) == number;
+        let position = |p: u32| model.body().map(|body| body.cloud.position[p as usize]);
+        let continued = model.points.continued.iter().filter(|&&p| own(p));
+        let continued = continued.filter_map(|&p| Some((cells.index(&position(p)?), p)));
         let sites = model.sites.iter().enumerate().filter_map(|(s, site)| {
             let SiteKind::Point(p) = site.kind else {
                 return None;
@@ -88,6 +90,10 @@ impl<'a, const D: usize> Grid<'a, D> {
                 .collect(),
             cells,
             sites: sites.collect(),
+            continued: match beyond {
+                Beyond::Follows => continued.collect(),
+                Beyond::IsPoint => FxHashMap::default(),
+            },
             elements: OnceLock::new(),
             barriers: Barriers::new(barriers.map_or(Vec::new(), |p| p.barriers.clone())),
             shifts,
@@ -105,6 +111,9 @@ impl<'a, const D: usize> Grid<'a, D> {
     fn corner(&self, index: &[i32; D]) -> Option<Vec<(u32, f64)>> {
         if let Some(site) = self.site(index) {
             return Some(vec![(site, 1.0)]);
+        }
+        if let (Some(&point), Some(body)) = (self.continued.get(index), self.model.body()) {
+            return Some(body.cloud.transfer.row(point as usize).collect());
         }
         let mesh = &self.model.mesh;
         let elements = self.elements.get_or_init(|| {

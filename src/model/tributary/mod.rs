@@ -117,10 +117,13 @@ impl<const D: usize> Model<D> {
     /// Finds the part of each site, and what rows are scaled by.
     pub(crate) fn share_out(&mut self) {
         let mut tributary = Tributary::new(self);
-        let is_light = tributary.volume.iter().any(|v| *v <= 0.0);
-        // rows of an energy are those of their loads whatever the masses are
-        let has_inertia = self.has_energy && !self.mesh.embedded.shares.is_empty();
-        if has_inertia && !is_light {
+        let is_beside_patch =
+            !self.mesh.embedded.shares.is_empty() && self.interface.constrained.is_none();
+        // rows of an energy, as those of elements beside a patch, are those of their loads whatever the masses are
+        let is_free = |site: usize| is_beside_patch && self.has_row_of_energy(site);
+        let mut volumes = tributary.volume.iter().enumerate();
+        let is_light = volumes.any(|(site, v)| *v <= 0.0 && !is_free(site));
+        if is_beside_patch && !is_light {
             self.tributary.shares = shares::shares(self);
             let mut inertia = Tributary::new(self);
             inertia.shares = self.tributary.shares.take();

@@ -381,13 +381,12 @@ impl<const D: usize> Parts<D> {
             let locator = inside.get_or_init(|| fem::Locator::new(mesh, own()));
             locator.holds(mesh, x, 1e-9)
         };
-        let of_lattice = model.passing();
         for (s, site) in model.sites.iter().enumerate() {
             let SiteKind::Point(p) = site.kind else {
                 continue;
             };
             let index = cells.index(&site.position);
-            let is_own = of_lattice.is_none_or(|o| usize::from(o.of_point[p as usize]) == number);
+            let is_own = model.lattice_of_point(p) == number;
             let is_inside = (0..D).all(|i| index[i] >= limits.0[i] && index[i] <= limits.1[i]);
             if !is_own || !is_inside || is_cut(&index) {
                 continue;

@@ -25,6 +25,7 @@ impl<const D: usize> PdBody<D> {
             volumes: &volumes,
             factors: &[],
             horizon: self.cloud.horizon.of(i),
+            bond_horizons: &[],
             materials: None,
         };
         let state = law.coefficients(&family, pair, omega);

@@ -31,6 +31,7 @@ pub(super) fn with_law<const D: usize, T>(
             Some(_) => (0..points).map(|i| u16::from(i % 3 == 0)).collect(),
             None => Vec::new(),
         },
+        ..Cloud::default()
     };
     let families = case.families.clone();
     let linear = law.linearised();

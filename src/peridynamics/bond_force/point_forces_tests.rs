@@ -65,7 +65,7 @@ fn pass_beside(
         volume: case.volume.clone(),
         horizon: Horizon::Uniform(3.0 * H),
         transfer: Transfer::default(),
-        material: Vec::new(),
+        ..Cloud::default()
     };
     let (families, linear) = (case.families.clone(), law.linearised());
     let body = PdBody::new(cloud, families, linear, &Factors::Plain, Ends::Differ).unwrap();

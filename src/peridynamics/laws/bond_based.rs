@@ -148,12 +148,16 @@ impl<const D: usize> LinearForceState<D> for BondBased<D> {
         pair: &mut [f64],
         _omega: &mut [f64],
     ) -> Result<Option<StatePart<D>>, PdError> {
-        let c = self
-            .micromodulus
-            .constant::<D>(family.horizon, self.tensor.get(0, 0, 0, 0));
+        let of_horizon = |horizon: f64| {
+            let c1111 = self.tensor.get(0, 0, 0, 0);
+            (horizon, self.micromodulus.constant::<D>(horizon, c1111))
+        };
+        let (mut horizon, mut c) = of_horizon(family.horizon);
         for (k, xi) in family.bonds.iter().enumerate() {
-            pair[k] =
-                0.5 * c * family.factors[k] * self.micromodulus.shape(xi.norm(), family.horizon);
+            if family.horizon_of(k) != horizon {
+                (horizon, c) = of_horizon(family.horizon_of(k));
+            }
+            pair[k] = 0.5 * c * family.factors[k] * self.micromodulus.shape(xi.norm(), horizon);
         }
         Ok(None)
     }

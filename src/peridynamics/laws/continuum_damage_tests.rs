@@ -61,6 +61,7 @@ impl Point {
             volumes: &volumes,
             factors: &vec![1.0; bonds.len()],
             horizon: HORIZON,
+            bond_horizons: &[],
             materials: None,
         };
         law.linearised()

@@ -136,6 +136,7 @@ mod tests {
             volumes: &volumes,
             factors: &[1.0; 14],
             horizon: HORIZON,
+            bond_horizons: &[],
             materials: None,
         };
         let state = law

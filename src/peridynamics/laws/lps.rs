@@ -159,7 +159,7 @@ impl<const D: usize> LinearForceState<D> for LinearPeridynamicSolid<D> {
     ) -> Result<Option<StatePart<D>>, PdError> {
         let mut shape = Tensor::<D>::zeros();
         for (k, xi) in family.bonds.iter().enumerate() {
-            omega[k] = family.factors[k] * self.influence.value(xi.norm(), family.horizon);
+            omega[k] = family.factors[k] * self.influence.value(xi.norm(), family.horizon_of(k));
             shape += xi * xi.transpose() * (omega[k] * family.volumes[k]);
         }
         let m = shape.trace();

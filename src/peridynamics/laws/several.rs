@@ -389,6 +389,7 @@ mod tests {
             volumes: &volumes,
             factors: &vec![1.0; bonds.len()],
             horizon: 2.0,
+            bond_horizons: &[],
             materials: Some(FamilyMaterials { own, far }),
         };
         (law.linearised()

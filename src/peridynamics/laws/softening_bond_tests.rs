@@ -46,6 +46,7 @@ fn point<const D: usize>(spacing: f64, m: i32) -> Point<D> {
         volumes: &volumes,
         factors: &vec![1.0; bonds.len()],
         horizon,
+        bond_horizons: &[],
         materials: None,
     };
     let linear = BondBased::<D>::new(Micromodulus::InverseDistance, SHEAR);

@@ -22,24 +22,19 @@ impl<const D: usize> Solved<'_, D> {
         }
     }
 
-    /// Stored energy of an element per volume \[J/m^D\], at a place in it: that of its law, `½ σ : ε` without thermal strains where that is linear.
+    /// Stored energy of an element per volume \[J/m^D\], at a place in it: that of its law, `½ σ : ε` without thermal strains where that is linear, with what holds the body back across its plane in plane strain.
     pub(super) fn energy_of_cell(&self, c: usize, place: &Place<'_, D>) -> f64 {
         let told = (self.state()).and_then(|state| state.energy_of_cell(c, self.displacement));
         let linear = || {
             let stress = place.stress();
-            let (free, across) = match self.thermal() {
-                Some((thermal, t)) => {
-                    let x = self.model.mesh.centroid(c);
-                    let material = self.model.material_of_cell(c);
-                    let free = thermal.stretch_at(&x, material, t);
-                    (
-                        thermal.cell_gradient(self.model, c, t),
-                        free * thermal.solid[usize::from(material)],
-                    )
-                }
+            let (free, held) = match self.thermal() {
+                Some((thermal, t)) => (
+                    thermal.cell_gradient(self.model, c, t),
+                    thermal.held_energy(self.model, c, t),
+                ),
                 None => (Tensor::zeros(), 0.0),
             };
-            0.5 * (stress.tensor.dot(&(place.gradient() - free)) - stress.across * across)
+            0.5 * stress.tensor.dot(&(place.gradient() - free)) + held
         };
         told.unwrap_or_else(linear)
     }

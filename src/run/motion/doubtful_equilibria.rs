@@ -78,7 +78,7 @@ impl<'a, const D: usize> DoubtfulEquilibria<'a, D> {
         // strains of free expansion are no stress
         if seen.state.broken == 0 && stresses.thermal.is_none() {
             let asked = Asked {
-                kinematics: stresses.kinematics,
+                stresses,
                 displacement: u,
                 uniform: self.uniform,
             };

@@ -85,7 +85,7 @@ pub(crate) fn dynamic<'a, const D: usize>(
     let moving = CoupledSystem::of_processes(
         model,
         operator,
-        coupling.symmetry(),
+        model.symmetry(),
         |material: u16| rest.density[material as usize],
         &BondBehaviour {
             kinematics,
@@ -103,14 +103,14 @@ pub(crate) fn dynamic<'a, const D: usize>(
         Ok(motion) => {
             let motion = motion.with_local_laws(&model.local_laws(&rest.local_laws))?;
             let motion = sharing_steps(motion.with_ranks(start.ranks), start.sharing);
-            if failure.is_some()
+            let may_lose = failure.is_some()
                 && motion.has_seam_bonds()
-                && operator.definiteness == Definiteness::NegativeTerms
-            {
+                && operator.definiteness == Definiteness::NegativeTerms;
+            if let Some(ratio) = rest.ratio.filter(|_| may_lose) {
                 return Err(RunError::Indefinite {
                     what: "bonds that break at the seam may bring that forth at any time; cut-bonds = \"linear\" in [coupling.truncated] keeps them whole".to_owned(),
-                    typed: rest.ratio.typed,
-                    pairwise: rest.ratio.pairwise,
+                    typed: ratio.typed,
+                    pairwise: ratio.pairwise,
                 });
             }
             tell_bonds(
@@ -365,7 +365,6 @@ fn assembled<'a, const D: usize>(
 /// [`RunError::System`] for bonds that cannot stretch.
 pub(crate) fn still<'a, const D: usize>(
     model: &'a Model<D>,
-    coupling: &dyn Coupling<D>,
     operator: &Operator<'_, D>,
     rest: &RunSettings<D>,
     asked_for: bool,
@@ -385,7 +384,7 @@ pub(crate) fn still<'a, const D: usize>(
         broken: None,
     };
     let density = |material: u16| rest.density[material as usize];
-    let symmetry = coupling.symmetry();
+    let symmetry = model.symmetry();
     let system = CoupledSystem::new(model, operator, symmetry, density, &behaviour)?;
     Ok(Some(
         system.with_local_laws(&model.local_laws(&rest.local_laws))?,

@@ -1,20 +1,21 @@
 //! A scene in time: from its beginning or a checkpoint to its end, an interrupt, or the edge of the nonlocal zone.
 
-use super::RunOptions;
-use super::breaks::{Breaks, breaks};
+use super::breaks::breaks;
 use super::contact::ContactRecord;
-use super::dynamic_system::{LayoutStart, PlaneEnergy, plane_energy};
+use super::dynamic_system::LayoutStart;
+use super::end_of_steps::end_of_steps;
 use super::guard::{Balance, energies_are_apart};
 use super::impact_record::ImpactRecord;
 use super::initial_state::{PreStep, RezoneState};
+use super::load_stage::{LoadSteps, forget};
 use super::rezoning::{Leaving, share};
-use super::saved::{EdgeReached, Saved, SavedZone, StepChoice};
+use super::saved::{Saved, SavedZone};
 use super::setup::{ModelSetup, RunSetup, begun, lay_out, opened};
 use super::sharing::sharing;
 use super::step_observer::{Segment, StepObserver, Stop, Watched};
-use super::writer::{Moment, Recorder};
+use super::writer::Moment;
+use super::{RunOptions, StartFrom};
 use crate::observe::checkpoint::{CheckpointError, CheckpointFile};
-use crate::observe::cracks::CrackSummary;
 use crate::observe::proof::{Part, Proof};
 use crate::observe::summary::{
     Ended, EnergyGain, MotionSummary, Rotation, RunSummary, Stopwatch, peak_memory_bytes,
@@ -37,6 +38,8 @@ use crate::{
 enum From<'a, const D: usize> {
     /// At time zero, or at a checkpoint.
     Start(CheckpointFile, Option<Box<Saved>>),
+    /// At time zero, with the last state of load steps before.
+    Loaded(CheckpointFile, Box<State>),
     /// At a change of the zones.
     Switch(Box<RezoneState<'a, D>>),
 }
@@ -73,6 +76,11 @@ pub(crate) fn run<const D: usize>(
             problem.body.zones = zones_of(&zone.nonlocal);
         }
     }
+    let load = rest.before.as_ref().filter(|_| saved.is_none());
+    let load = load.map(|stage| LoadSteps::new(stage, &rest));
+    if load.is_some() && options.start == StartFrom::Beginning && options.writes() {
+        forget(&rest.output, &file)?;
+    }
     let mut from = From::Start(file, saved.map(Box::new));
     let start = LayoutStart {
         broken: None,
@@ -81,7 +89,7 @@ pub(crate) fn run<const D: usize>(
     };
     loop {
         let bonds = match &mut from {
-            From::Start(..) => None,
+            From::Start(..) | From::Loaded(..) => None,
             From::Switch(between) => Some(std::mem::take(&mut between.broken)),
         };
         let start = LayoutStart {
@@ -90,8 +98,13 @@ pub(crate) fn run<const D: usize>(
         };
         let (segment, back) = lay_out(begun, problem, &rest, start, progress, |laid_out| {
             let model = laid_out.model;
-            run_segment(laid_out, from, &rest, spec, options, progress)
-                .map_err(|error| explained(error, model, &model.local_laws(&rest.local_laws)))
+            let done = match (&load, from) {
+                (Some(load), From::Start(file, None)) => {
+                    after_load_steps(laid_out, load, file, &rest, (spec, options), progress)
+                }
+                (_, from) => run_segment(laid_out, from, &rest, spec, options, progress),
+            };
+            done.map_err(|error| explained(error, model, &model.local_laws(&rest.local_laws)))
         })?;
         problem = back;
         match segment {
@@ -103,6 +116,27 @@ pub(crate) fn run<const D: usize>(
             }
         }
     }
+}
+
+/// Load steps, and the motion that begins with their last state; a summary of the load steps alone where they end before.
+fn after_load_steps<'r, const D: usize>(
+    laid_out: ModelSetup<'_, D>,
+    load: &LoadSteps<'_, D>,
+    file: CheckpointFile,
+    rest: &'r RunSettings<D>,
+    (spec, options): (&Spec, &RunOptions<'r>),
+    progress: &dyn Progress,
+) -> Result<RunSegment<'r, D>, RunError> {
+    let (first, goes_on) = load.run(laid_out, rest, options, progress)?;
+    let Some((laid_out, state)) = goes_on else {
+        return Ok(RunSegment::Ended(Box::new(first)));
+    };
+    let from = From::Loaded(file, Box::new(state));
+    let mut done = run_segment(laid_out, from, rest, spec, options, progress)?;
+    if let RunSegment::Ended(summary) = &mut done {
+        load.tell(first, summary);
+    }
+    Ok(done)
 }
 
 /// Zones of cells that are nonlocal or local.
@@ -175,7 +209,10 @@ fn run_segment<'r, const D: usize>(
         setup: &mut record.setup,
     };
     let mut begin = match from {
-        From::Start(file, saved) => before.at_start(*options, file, saved.map(|saved| *saved))?,
+        From::Start(file, saved) => {
+            before.at_start(*options, file, saved.map(|saved| *saved), None)?
+        }
+        From::Loaded(file, state) => before.at_start(*options, file, None, Some(*state))?,
         From::Switch(between) => before.after_switch(*between)?,
     };
     let segment = Segment {
@@ -358,72 +395,4 @@ fn motion_summary<const D: usize>(
         switches,
         ..summary
     })
-}
-
-/// Energies and cracks at the end of steps in time or of load steps: of a state with its system and its kinetic energy.
-///
-/// # Errors
-/// [`RunError::Fracture`].
-pub(super) fn end_of_steps<const D: usize>(
-    (model, rest): (&Model<D>, &RunSettings<D>),
-    recorder: &mut Recorder<'_, D>,
-    (state, system, kinetic): (&State, &dyn SemiDiscrete, f64),
-    (breaks, edge, pace): (Breaks, Option<EdgeReached>, StepChoice),
-) -> Result<MotionSummary, RunError> {
-    let stored = system.stored_energy(&state.u);
-    let plane = plane_energy(model, rest)?;
-    let area = recorder.crack_area(state.broken, system);
-    Ok(MotionSummary {
-        ended: Ended::Finished,
-        steps: state.step,
-        of_steps: pace.steps,
-        time: state.time,
-        step: pace.step,
-        stable_step: None,
-        kinetic_energy: kinetic,
-        stored_energy: stored,
-        external_work: state.work,
-        missing_energy: recorder.energy_at_start + state.work - kinetic - stored,
-        energy_gain: None,
-        cracks: cracks(system, breaks, area, plane),
-        inelastic_energy: inelastic_energy(system),
-        impactors: (recorder.impact.as_ref()).map_or(Vec::new(), |i| i.summary(state)),
-        broken_bonds: state.broken,
-        edge_reached: edge.map(|e| {
-            let x = model.sites[e.site as usize].position;
-            (e.time, x.iter().copied().collect())
-        }),
-        steps_per_second: 0.0,
-        switches: Vec::new(),
-        nonlocal_share: [0.0; 3],
-        processes: Vec::new(),
-    })
-}
-
-/// Returns the dissipation by breaking bonds so far, and the area of the cracks; none where no bond can break.
-fn cracks(
-    system: &dyn SemiDiscrete,
-    breaks: Breaks,
-    area: f64,
-    plane: Option<PlaneEnergy>,
-) -> Option<CrackSummary> {
-    let spent = system.dissipation().filter(|_| breaks.may())?;
-    if breaks == Breaks::Gradually {
-        // what the law dissipated is told of on its own: most of it beside the cracks
-        return Some(CrackSummary {
-            energy_per_area: None,
-            ..CrackSummary::new(spent.energy, area)
-        });
-    }
-    Some(CrackSummary {
-        plane_energy: plane.map(|p| p.of_plane),
-        fracture_energy: plane.and_then(|p| p.typed),
-        ..CrackSummary::new(spent.energy, area)
-    })
-}
-
-/// Returns the energy that a law with history variables has dissipated; none if that is zero.
-fn inelastic_energy(system: &dyn SemiDiscrete) -> Option<f64> {
-    let inelastic = system.dissipation().map(|d| d.inelastic);
-    inelastic.filter(|energy| *energy != 0.0)
 }

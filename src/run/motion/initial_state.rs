@@ -15,7 +15,7 @@ use super::time_step::{held, paced, repaced};
 use super::writer::Recorder;
 use crate::contact::SurfaceContact;
 use crate::coupling::impact::RESOLVED;
-use crate::observe::checkpoint::CheckpointFile;
+use crate::observe::checkpoint::{CheckpointError, CheckpointFile};
 use crate::observe::proof::Part;
 use crate::observe::summary::{Decision, Timings, bytes_text};
 use crate::observe::warning::Code;
@@ -27,8 +27,9 @@ use crate::run::proof::growth::{GrowthQuestion, free_start};
 use crate::run::setup::RunSettings;
 use crate::scene::solve::Explicit as Spec;
 use crate::scene::spec::UnprovenSpec;
-use crate::solve::explicit::State;
+use crate::solve::explicit::{Drive as _, State};
 use crate::system::Dissipation;
+use crate::tensor::AXES;
 use crate::{
     coupling::{BrokenBonds, Operator},
     model::{Model, Sampler},
@@ -94,20 +95,22 @@ pub(crate) struct PreStep<'a, 'r, 'm, const D: usize> {
 }
 
 impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
-    /// Begins at time zero, or where a checkpoint was `saved`; `options` are those of the run.
+    /// Begins at time zero, with what load steps before have `loaded`, or where a checkpoint was `saved`; `options` are those of the run.
     ///
     /// # Errors
-    /// [`RunError`] if no stable step is found, or the checkpoint is that of another model.
+    /// [`RunError`] if no stable step is found, the checkpoint is that of another model, or a condition would move what load steps have left elsewhere.
     pub fn at_start(
         self,
         options: RunOptions<'r>,
         file: CheckpointFile,
         saved: Option<Saved>,
+        loaded: Option<State>,
     ) -> Result<StepState<'r, 'm, D>, RunError> {
         let (model, rest, spec) = (self.model, self.rest, self.spec);
         let mut held = held(model, &rest.conditions)?;
         held.extend(prescribed(&rest.impactors, model.sites.len()));
-        let begin = start(model, rest);
+        let mut begin = start(model, rest);
+        let left = prestrained(&mut begin, loaded.as_ref(), saved.as_ref(), &file)?;
         let choices = &mut self.setup.choices;
         let (moving, impact) = impacted(model, rest, self.moving, &begin, RESOLVED, choices)?;
         choices.push(Decision {
@@ -138,12 +141,16 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
                     .to_owned(),
             });
         }
+        if loaded.is_some() {
+            stay((model, rest), &drive, &begin.u)?;
+        }
         restore(moving.system.as_mut(), saved.as_ref(), &file)?;
         let written = saved.as_ref().map(|s| &s.written);
         let of = (breaks(moving.system.as_ref(), rest), moving.is_linear);
         let touches = (impact, self.contact);
         let every = (options, spec.checkpoint_every);
         let mut recorder = recorder((model, rest), every, touches, of, file, written)?;
+        recorder.loaded = left;
         recorder.hold(drive.holders());
         recorder.cut(model, rest, self.terms)?;
         let resumed = saved.is_some();
@@ -234,6 +241,67 @@ impl<'r: 'm, 'm, const D: usize> PreStep<'_, 'r, 'm, D> {
             due,
         })
     }
+}
+
+/// Begins with what load steps have `loaded`, or had before the run was `saved`; returns the displacement that they have left, nothing without any.
+///
+/// # Errors
+/// [`CheckpointError::Content`] for that of another body.
+fn prestrained(
+    begin: &mut State,
+    loaded: Option<&State>,
+    saved: Option<&Saved>,
+    file: &CheckpointFile,
+) -> Result<Vec<f64>, RunError> {
+    let left = match (loaded, saved) {
+        (Some(state), _) => {
+            (begin.work, begin.broken) = (state.work, state.broken);
+            state.u.clone()
+        }
+        (None, Some(saved)) => saved.loaded.clone(),
+        (None, None) => Vec::new(),
+    };
+    // sites of impactors come last
+    match begin.u.get_mut(..left.len()) {
+        Some(of_body) => of_body.copy_from_slice(&left),
+        None => {
+            return Err(RunError::Checkpoint(CheckpointError::Content {
+                path: file.path().to_path_buf(),
+                message: "its sites are not those of this model".to_owned(),
+            }));
+        }
+    }
+    Ok(left)
+}
+
+/// Displacement that a condition may prescribe beside the one that load steps have left, over the largest.
+const BESIDE: f64 = 1e-9;
+
+/// Refuses conditions that begin with the motion and prescribe another displacement than `u`, which load steps have left.
+///
+/// # Errors
+/// [`RunError::Jump`].
+fn stay<const D: usize>(
+    (model, rest): (&Model<D>, &RunSettings<D>),
+    drive: &SceneDrive<'_, D>,
+    u: &[f64],
+) -> Result<(), RunError> {
+    let mut values = vec![0.0; drive.prescribed().len()];
+    drive.displacement_into(0.0, &mut values);
+    let largest = u.iter().fold(0.0, |most: f64, u| most.max(u.abs()));
+    for ((dof, holder), value) in drive.holders().zip(values) {
+        let dof = dof as usize;
+        if (value - u[dof]).abs() > BESIDE * largest {
+            return Err(RunError::Jump {
+                condition: rest.conditions[holder as usize].name.clone(),
+                axis: AXES[dof % D],
+                place: model.sites[dof / D].position.as_slice().to_vec(),
+                prescribed: value,
+                left: u[dof],
+            });
+        }
+    }
+    Ok(())
 }
 
 /// The conditions of a scene, from time zero to its end.

@@ -3,6 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `setup.rs` | set-up of every run |
+//! | `load_stage.rs` | load steps before a motion |
 //! | `breaks.rs` | possibility that bonds break |
 //! | `dynamic_system.rs` | the dynamic system, its masses, its initial state |
 //! | `sharing.rs` | distribution of it over several processes |
@@ -16,6 +17,7 @@
 //! | `time_step.rs` | the time step, with sub-cycling |
 //! | `contact.rs` | contact of surfaces, and its record |
 //! | `impact.rs`, `driven_impactors.rs`, `impact_record.rs` | rigid impactors: contact, prescribed motion, record |
+//! | `end_of_steps.rs` | energies and cracks at the end |
 //! | `way.rs` | the displacement by a prescribed velocity |
 //! | `guard.rs`, `seen.rs` | monitoring of energy, rotation of elements and strains |
 //! | `zone_monitor.rs`, `bounding_boxes.rs` | cells wanted in a zone that follows the crack |
@@ -37,6 +39,7 @@ mod created_energy;
 mod doubtful_equilibria;
 pub(crate) mod driven_impactors;
 pub mod dynamic_system;
+mod end_of_steps;
 pub mod explicit;
 mod field_output;
 pub(crate) mod guard;
@@ -44,6 +47,7 @@ pub(crate) mod impact;
 pub(crate) mod impact_record;
 pub(crate) mod initial_state;
 mod inside_step;
+pub(crate) mod load_stage;
 mod load_step_params;
 mod material_stretches;
 mod newton_factors;
@@ -160,6 +164,19 @@ fn paces_by_clock(solve: &Solve, options: &RunOptions<'_>) -> bool {
     matches!(pace, Some(Pace::Clock(_)))
 }
 
+/// Refuses a scene in stages, which no more than one process runs.
+///
+/// # Errors
+/// [`RunError::LoadStageShared`].
+pub(crate) fn has_one_stage<const D: usize>(scene: &Scene<D>) -> Result<(), RunError> {
+    match &scene.before {
+        None => Ok(()),
+        Some(stage) => Err(RunError::LoadStageShared {
+            stage: stage.name.clone(),
+        }),
+    }
+}
+
 /// Runs a scene in time or under a load that grows.
 pub(crate) fn run<const D: usize>(
     scene: Scene<D>,
@@ -171,6 +188,9 @@ pub(crate) fn run<const D: usize>(
             what: "checkpoints by the clock in a run of several processes, which would not write them in the same step",
             remedy: "count steps instead: checkpoint-every = 1000",
         });
+    }
+    if options.ranks.is_some() {
+        has_one_stage(&scene)?;
     }
     match scene.solve.clone() {
         Solve::Explicit(solve) => explicit::run(scene, &solve, options, progress),

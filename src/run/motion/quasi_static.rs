@@ -11,7 +11,7 @@ use super::contact::ContactRecord;
 use super::created_energy::{created_energy, set_free};
 use super::doubtful_equilibria::DoubtfulEquilibria;
 use super::dynamic_system::{failing_stretch, start};
-use super::explicit::end_of_steps;
+use super::end_of_steps::end_of_steps;
 use super::field_output::FieldOutput;
 use super::guard::energies_are_apart;
 use super::impact::{BodyOnly, impacted};
@@ -20,7 +20,7 @@ use super::inside_step::InsideStep;
 use super::load_step_params::{equilibrium_params, step_choice};
 use super::parted::has_parted;
 use super::saved::{EdgeReached, Saved, StepChoice};
-use super::setup::{ModelSetup, RunSetup, laid_out, opened, recorder, restore};
+use super::setup::{ModelSetup, laid_out, opened, recorder, restore};
 use super::spread_factors::Leads;
 use super::time_dependent_loads::SceneDrive;
 use super::writer::{Moment, Recorder};
@@ -61,8 +61,21 @@ pub(crate) fn run<const D: usize>(
         options.ranks,
         progress,
         |rest, choices| opened(rest, options, choices),
-        |laid_out, (file, saved)| load_steps(laid_out, file, saved, spec, options, progress),
+        |laid_out, (file, saved)| {
+            let loaded = load_steps(laid_out, file, saved, spec, options, progress)?;
+            Ok(loaded.summary)
+        },
     )
+}
+
+/// Load steps that are done, with what a motion after them goes on with.
+pub(super) struct Loaded<'a, const D: usize> {
+    /// Their summary.
+    pub summary: RunSummary,
+    /// The last state of equilibrium.
+    pub state: State,
+    /// The model, whose system has the history of the load.
+    pub laid_out: ModelSetup<'a, D>,
 }
 
 /// Loads and supports over the load steps, from the displacement `start`.
@@ -73,41 +86,41 @@ fn driven<'a, const D: usize>(
     spec: &Spec,
 ) -> Result<SceneDrive<'a, D>, RunError> {
     let steps = (spec.duration / spec.steps as f64, spec.steps as u64);
-    let at_rest = BodyForces::Consistent;
-    let drive = SceneDrive::new(model, &rest.conditions, start, steps, at_rest)?;
+    // a motion that begins with the last equilibrium shares them out by its masses
+    let body_forces = match rest.is_in_time {
+        true => BodyForces::Lumped,
+        false => BodyForces::Consistent,
+    };
+    let drive = SceneDrive::new(model, &rest.conditions, start, steps, body_forces)?;
     Ok(drive.with_impactors(&rest.impactors, steps.1))
 }
 
 /// Load steps from the beginning or a checkpoint.
 // One function: everything that a step asks for, in the order in which it is found.
-fn load_steps<const D: usize>(
-    laid_out: ModelSetup<'_, D>,
+pub(super) fn load_steps<'a, const D: usize>(
+    mut laid_out: ModelSetup<'a, D>,
     file: CheckpointFile,
     saved: Option<Saved>,
     spec: &Spec,
     options: &RunOptions<'_>,
     progress: &dyn Progress,
-) -> Result<RunSummary, RunError> {
+) -> Result<Loaded<'a, D>, RunError> {
     let (model, operator, rest) = (laid_out.model, laid_out.operator, laid_out.rest);
     let doubts = DoubtfulEquilibria::new(&laid_out);
     let parts = linear_parts(&laid_out, options)?;
-    let RunSetup {
-        title,
-        traits,
-        mut choices,
-        mut timings,
-        mut watch,
-        ..
-    } = laid_out.setup;
+    let mut setup = laid_out.setup;
     let begin = start(model, rest);
-    let (moving, impact) = impacted(model, rest, laid_out.moving, &begin, 1.0, &mut choices)?;
-    let (mut system, is_linear) = (moving.system, moving.is_linear);
-    let (pace, params) = (step_choice(spec), equilibrium_params(spec, &mut choices));
+    let (moving, contact) = (laid_out.moving, laid_out.contact.clone());
+    let (mut moving, impact) = impacted(model, rest, moving, &begin, 1.0, &mut setup.choices)?;
+    let (system, is_linear) = (&mut moving.system, moving.is_linear);
+    let params = equilibrium_params(spec, &mut setup.choices);
+    let pace = step_choice(spec);
     let body = (model, operator, laid_out.terms.as_ref());
     let how = (system.symmetry(), params.equilibrium);
-    let leads = Leads::new(body, how, (rest, options.ranks), &mut choices, progress)?;
+    let told = &mut setup.choices;
+    let leads = Leads::new(body, how, (rest, options.ranks), told, progress)?;
     let made = leads.made(progress)?;
-    leads.time(&mut watch, &mut timings);
+    leads.time(&mut setup.watch, &mut setup.timings);
     let thermal = rest.stresses.thermal.as_ref();
     let drive = driven(model, rest, &begin.u, spec)?;
     let drive = drive.heated(thermal, operator, is_linear)?;
@@ -116,7 +129,7 @@ fn load_steps<const D: usize>(
     let breaks = breaks(system.as_ref(), rest);
     let every = spec.checkpoint_every;
     let written = at.map(|saved| &saved.written);
-    let (of, touches) = ((breaks, false), (impact, laid_out.contact));
+    let (of, touches) = ((breaks, false), (impact, contact));
     let mut recorder = recorder((model, rest), (*options, every), touches, of, file, written)?;
     recorder.hold(drive.holders());
     recorder.cut(model, rest, Arc::clone(&laid_out.terms))?;
@@ -148,26 +161,34 @@ fn load_steps<const D: usize>(
         rotation: None,
         failed: None,
     };
-    watch.lap(&mut timings, "start");
+    setup.lap("start");
     let refactor = leads.of_present_tangents();
     let near = (leads.lead(made.as_deref())).map(|lead| BodyOnly::new(lead, model));
     let near = (near.as_ref(), refactor.as_ref());
-    let taken = observer.take_steps(system.as_mut(), params, near, &mut loaded, &mut timings);
-    choices.push(observer.spent());
+    let timings = &mut setup.timings;
+    let taken = observer.take_steps(system.as_mut(), params, near, &mut loaded, timings);
+    setup.choices.push(observer.spent());
+    let state = observer.state.clone();
     let summary = observer.summary(system.as_ref(), first, taken?)?;
-    let of_model = warnings(model, traits, &laid_out.proof).into_iter();
+    let of_model = warnings(model, setup.traits, &laid_out.proof).into_iter();
     let of_model = of_model.chain(of_elements(model, &model.local_laws(&rest.local_laws)));
-    Ok(RunSummary {
-        scene: title,
-        coupling: traits.name.to_owned(),
+    let summary = RunSummary {
+        scene: setup.title.clone(),
+        coupling: setup.traits.name.to_owned(),
         sizes: sizes(model, operator),
-        choices,
-        total_seconds: timings.total(),
-        timings,
+        choices: setup.choices.clone(),
+        total_seconds: setup.timings.total(),
+        timings: setup.timings.clone(),
         peak_memory_bytes: peak_memory_bytes(),
         warnings: of_model.chain(summary.warnings.clone()).collect(),
-        proof: laid_out.proof,
+        proof: laid_out.proof.clone(),
         ..summary
+    };
+    (laid_out.setup, laid_out.moving) = (setup, moving);
+    Ok(Loaded {
+        summary,
+        state,
+        laid_out,
     })
 }
 

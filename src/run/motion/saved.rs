@@ -15,6 +15,8 @@ use crate::solve::explicit::State;
 pub(crate) struct Saved {
     /// Fields, time, step, work, broken bonds.
     pub state: State,
+    /// Displacement that load steps before the motion left it to begin with; empty without any.
+    pub loaded: Vec<f64>,
     /// Damage state of the system.
     pub damage: Vec<u64>,
     /// The time step and the limits that it was chosen by.

@@ -16,6 +16,7 @@ use crate::observe::checkpoint::{CheckpointError, CheckpointFile, Found, Pace};
 use crate::observe::proof::Proof;
 use crate::observe::summary::{Decision, Stopwatch, Timings, resident_memory_bytes};
 use crate::progress::Progress;
+use crate::run::bonds;
 use crate::run::condition_terms::ConditionTerms;
 use crate::run::conduction::heated_problem;
 use crate::run::error::RunError;
@@ -116,7 +117,9 @@ pub(crate) fn lay_out<const D: usize, T>(
 ) -> Result<(T, Problem<D>), RunError> {
     let holders = (start.ranks).filter(|_| start.sharing == Sharing::Families);
     let (model, coupling) = setup::shared_model(problem, rest, holders, progress)?;
+    bonds::check(&model, &rest.output, start.ranks)?;
     run.choices.extend(setup::model_choices(&model));
+    run.choices.extend(bonds::told(&model, &rest.output));
     run.lap("sites and bonds");
     let bytes = resident_memory_bytes().unwrap_or(0);
     let operator = coupling.operator(&model)?;

@@ -414,7 +414,7 @@ impl<'a, 'r, const D: usize> StepObserver<'a, 'r, D> {
         let is_whole = self.segment.breaks == Breaks::Never;
         if is_whole && rest.stresses.thermal.is_none() && self.steep.is_empty() {
             let asked = Asked {
-                kinematics: rest.stresses.kinematics,
+                stresses: &rest.stresses,
                 displacement: &state.u,
                 uniform,
             };

@@ -85,7 +85,8 @@ impl Tables {
                 let found = integrals.get(k).and_then(Option::as_ref);
                 row.extend(of_integrals(found));
             }
-            options.keep(&format!("tip_{}", tip.name), table, &row)?;
+            let name = output.table(&format!("tip_{}", tip.name));
+            options.keep(&name, table, &row)?;
         }
         Ok(())
     }
@@ -112,7 +113,7 @@ impl Tables {
             for values in solution.rows(positions) {
                 let mut row = when(state);
                 row.extend(values.into_iter().map(Entry::from));
-                options.keep(name, table, &row)?;
+                options.keep(&output.table(name), table, &row)?;
             }
         }
         Ok(())

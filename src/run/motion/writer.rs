@@ -23,6 +23,7 @@ use crate::observe::pieces::agreed;
 use crate::observe::series::Series;
 use crate::observe::summary::{ConditionForce, SectionForce};
 use crate::observe::tip_summary::TipSummary;
+use crate::run::bonds;
 use crate::run::condition_terms::ConditionTerms;
 use crate::run::energy_release;
 use crate::run::error::RunError;
@@ -32,6 +33,7 @@ use crate::run::pieces::Piece;
 use crate::run::setup::RunSettings;
 use crate::run::solution::Solved;
 use crate::run::write::{Remembered, Shown, snapshot};
+use crate::scene::bond_output::BondSelection;
 use crate::scene::conditions::Condition;
 use crate::scene::validated::{Output, Tip};
 use crate::solve::explicit::{Explicit, State};
@@ -125,6 +127,8 @@ pub struct Recorder<'a, const D: usize> {
     history: CsvTable,
     tables: Tables,
     series: Series,
+    /// Bonds of each selection.
+    bonds: Vec<Series>,
     checkpoint: CheckpointFile,
     options: RunOptions<'a>,
     last_checkpoint: Instant,
@@ -138,6 +142,8 @@ pub struct Recorder<'a, const D: usize> {
     cracks: (u64, f64),
     /// Integrals at the tips of the present state, one for each; empty where the scene asks for none.
     pub tips: Vec<Option<TipSummary>>,
+    /// Displacement that load steps before the motion left it to begin with; empty without any.
+    pub loaded: Vec<f64>,
     /// Seconds that writing took.
     pub seconds: f64,
 }
@@ -171,6 +177,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let begun = files_begun(output, header, &checkpoint, &options, written);
         let begun = agreed(options.ranks, begun, &output.directory);
         let (history, tables, series) = begun?;
+        let bonds = bond_series(output, &options, series.times());
+        let bonds = agreed(options.ranks, bonds, &output.directory)?;
         Ok(Self {
             output,
             probes,
@@ -182,6 +190,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             history,
             tables,
             series,
+            bonds,
             checkpoint,
             options,
             last_checkpoint: Instant::now(),
@@ -190,6 +199,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             growth: written.map_or_else(CrackGrowth::default, |w| w.growth),
             cracks: (0, 0.0),
             tips: Vec::new(),
+            loaded: Vec::new(),
             seconds: 0.0,
         })
     }
@@ -235,7 +245,9 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let Moment { state, system, .. } = moment;
         // a body that begins deformed may have flowed to get there
         let dissipated = self.dissipated(*system);
-        self.energy_at_start = moment.kinetic + system.stored_energy(&state.u) + dissipated;
+        let energy = moment.kinetic + system.stored_energy(&state.u) + dissipated;
+        // work of load steps before is stored by now, or gone
+        self.energy_at_start = energy - state.work;
     }
 
     fn dissipated(&self, system: &dyn SemiDiscrete) -> f64 {
@@ -327,7 +339,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 .flat_map(|contact| contact.row(state))
                 .map(Entry::from),
         );
-        self.options.keep("history", &mut self.history, &row)?;
+        let name = self.output.table("history");
+        self.options.keep(&name, &mut self.history, &row)?;
         let may_be_damaged = state.broken > 0 || self.breaks == Breaks::Gradually;
         self.tables.tips(
             (self.output, &self.tips),
@@ -401,6 +414,12 @@ impl<'a, const D: usize> Recorder<'a, D> {
             self.series.push_pieces(time, own, ranks)?;
         } else if writes {
             written = Some(self.series.push(time, of(Shown::All))?);
+            for (selection, series) in self.output.bonds.iter().zip(&mut self.bonds) {
+                series.push(
+                    time,
+                    bonds::snapshot(solved, selection, &self.output.origin),
+                )?;
+            }
         }
         if let Some(observer) = observer {
             let mut shown = written.unwrap_or_else(|| of(Shown::All));
@@ -456,6 +475,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         }
         self.checkpoint.write(&Saved {
             state: state.clone(),
+            loaded: self.loaded.clone(),
             damage: system.damage_state(),
             pace,
             written: Written {
@@ -479,6 +499,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let mut files = Vec::new();
         if self.options.writes() && !self.series.times().is_empty() {
             files.push(self.series.collection());
+            files.extend(self.bonds.iter().map(Series::collection));
         }
         let tables = std::iter::once(&self.history).chain(self.tables.iter());
         files.extend(
@@ -522,6 +543,27 @@ fn files_begun<const D: usize>(
         series.write_collection()?;
     }
     Ok((history, tables, series))
+}
+
+/// The series of files of each selection of bonds, as long as that of the body at a checkpoint.
+fn bond_series<const D: usize>(
+    output: &Output<D>,
+    options: &RunOptions<'_>,
+    times: &[f64],
+) -> Result<Vec<Series>, ObserveError> {
+    let one = |selection: &BondSelection<D>| {
+        let name = selection.stem(&output.name);
+        let series = Series::resumed(&output.directory, &name, times.to_vec());
+        if options.writes() {
+            if times.is_empty() {
+                series.remove_collection();
+            }
+            series.remove_later();
+            series.write_collection()?;
+        }
+        Ok(series)
+    };
+    output.bonds.iter().map(one).collect()
 }
 
 fn history_header<const D: usize>(

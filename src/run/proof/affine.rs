@@ -16,7 +16,7 @@ use crate::tensor::{Tensor, Tensor4, Vector};
 use crate::{assembly::Row, parallel};
 use crate::{
     coupling::Operator,
-    model::{Model, Site, SiteKind, Zone},
+    model::{HorizonChange, Model, Site, SiteKind, Zone},
 };
 
 /// Most rows whose kind is found out one by one; of more, a sample of the worst.
@@ -157,12 +157,24 @@ fn prove<const D: usize>(
         Layout {
             is_lattice: model.is_lattice(),
             is_truncated: model.faces_cut_bonds(),
+            takes_splice: takes_splice(model),
             skin: match unbalanced.is_empty() {
                 true => Skin::Possible,
                 false => surface::skin(model),
             },
         },
     )
+}
+
+/// Returns true if a splice of the horizons of the points is offered.
+fn takes_splice<const D: usize>(model: &Model<D>) -> bool {
+    let horizons = model.body().map(|body| body.cloud.horizon.values().len());
+    let is_few = horizons.is_some_and(|count| count <= HorizonChange::MOST_HORIZONS);
+    is_few
+        && model
+            .peridynamics
+            .as_ref()
+            .is_some_and(|p| p.accelerator().is_some())
 }
 
 fn is_point<const D: usize>(site: &Site<D>) -> bool {
@@ -394,11 +406,12 @@ fn class<const D: usize>(
     let model = subject.model;
     let x = &model.sites[site as usize].position;
     let reach = reach + cut_bonds_reach(model, site);
+    let varies = (model.body()).is_some_and(|body| body.cloud.horizon.uniform().is_none());
     let taken;
     let columns: &[u32] = match subject.stiffness {
         Some(stiffness) => stiffness.row(site as usize).0,
         // a row of a state-based law costs as much as a thousand bonds
-        None if subject.has_points_alone && subject.damaged.is_empty() => &[],
+        None if subject.has_points_alone && subject.damaged.is_empty() && !varies => &[],
         None => {
             subject.operator.add_row(site as usize, row);
             taken = row.take_columns();
@@ -430,6 +443,9 @@ fn class<const D: usize>(
         (true, None, false) => RowClass::Seam,
         (true, ..) => RowClass::SeamAtSurface,
         (false, _, true) => RowClass::Crack,
+        (false, None, _) if varies && joins_horizons(model, site, columns) => {
+            RowClass::HorizonChange
+        }
         (false, None, _) => RowClass::Points,
         (false, Some(_), _)
             if model.zones.contains(&Zone::Transition)
@@ -444,6 +460,17 @@ fn class<const D: usize>(
         },
     };
     (class, facet, is_alone)
+}
+
+/// Returns true if the row of a site has points of other horizons than its own.
+fn joins_horizons<const D: usize>(model: &Model<D>, site: u32, columns: &[u32]) -> bool {
+    let of = |site: u32| {
+        let (body, point) = model.point_of(site as usize)?;
+        Some(body.cloud.horizon.of(point))
+    };
+    let own = of(site);
+    let mut others = columns.iter().filter_map(|&column| of(column));
+    others.any(|other| Some(other) != own)
 }
 
 /// Prediction of the error of the stress around a row.
@@ -470,7 +497,9 @@ fn predicted<const D: usize>(
         (RowClass::Crack | RowClass::Border, _) | (RowClass::SeamAtSurface, None) => {
             return Predicted::NotAsked;
         }
-        (RowClass::Seam | RowClass::Points, _) | (_, None) => (None, gradients(tensor)),
+        (RowClass::Seam | RowClass::Points | RowClass::HorizonChange, _) | (_, None) => {
+            (None, gradients(tensor))
+        }
         (_, Some(f)) => {
             let n = around.boundary.normals[f];
             let mut stresses: Vec<Tensor<D>> =

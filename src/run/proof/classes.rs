@@ -35,6 +35,8 @@ pub(super) enum RowClass {
     Seam,
     /// Points alone, their families full of points.
     Points,
+    /// Points alone, of different horizons.
+    HorizonChange,
     /// A point of a transition zone whose family lacks points beyond a surface of the body.
     Transition,
     /// A family of the row lacks points beyond a free surface.
@@ -52,9 +54,10 @@ pub(super) enum RowClass {
 }
 
 impl RowClass {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 10] = [
         Self::Seam,
         Self::Points,
+        Self::HorizonChange,
         Self::Transition,
         Self::FreeSurface,
         Self::Support,
@@ -158,6 +161,12 @@ const TRUNCATED: Remedy = Remedy {
     keys: &[&["coupling=truncated"]],
 };
 
+/// The rule under which a uniform strain leaves no force.
+const SPLICE: Remedy = Remedy {
+    words: "peridynamics.horizon-change = \"splice\" leaves no such error, but forces are no pairs then",
+    keys: &[&["peridynamics.horizon-change=splice"]],
+};
+
 /// Properties of a model that decide which remedies there are.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layout {
@@ -167,6 +176,8 @@ pub(super) struct Layout {
     pub is_truncated: bool,
     /// Possibility of elements at surfaces.
     pub skin: Skin,
+    /// True if the horizon has so few values that points may see others with their own.
+    pub takes_splice: bool,
 }
 
 /// Returns the results of this part of the proof, as data.
@@ -219,6 +230,7 @@ impl RowClass {
         match self {
             Self::Seam => "at the seam",
             Self::Points => "among points",
+            Self::HorizonChange => "where the horizon changes",
             Self::Transition => "of the transition zone at surfaces",
             Self::FreeSurface => "at free surfaces",
             Self::Support => "at supports",
@@ -236,6 +248,7 @@ fn described(class: RowClass, layout: Layout) -> Option<(&'static str, Remedy, [
         is_lattice,
         is_truncated,
         skin,
+        takes_splice,
     } = layout;
     Some(match class {
         RowClass::Seam if is_lattice && is_truncated => (
@@ -271,6 +284,16 @@ fn described(class: RowClass, layout: Layout) -> Option<(&'static str, Remedy, [
             "among the points, which are no lattice,",
             Remedy::in_words("give peridynamics.points a lattice"),
             [limits::WARN, limits::REFUSE],
+        ),
+        RowClass::HorizonChange => (
+            "where the horizon changes",
+            match takes_splice {
+                true => SPLICE,
+                false => Remedy::in_words(
+                    "let the slope of the horizon change over a greater length, or use coupling.partial-stress there",
+                ),
+            },
+            [limits::WARN, f64::INFINITY],
         ),
         RowClass::SeamAtSurface => (
             "where the seam meets the surface of the body",
@@ -324,7 +347,10 @@ impl Remedy {
 /// Returns the finding on a class of rows, if there is one.
 fn verdict(rows: &Unbalanced, layout: Layout) -> Option<Finding> {
     let (what, remedy, [warn, refuse]) = described(rows.class, layout)?;
-    let is_surface = !matches!(rows.class, RowClass::Seam | RowClass::Points);
+    let is_surface = !matches!(
+        rows.class,
+        RowClass::Seam | RowClass::Points | RowClass::HorizonChange
+    );
     if rows.residual < limits::NEGLIGIBLE {
         return None;
     }

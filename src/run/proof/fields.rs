@@ -45,7 +45,7 @@ pub(super) fn of_stress<const D: usize>(tensor: &Tensor4<D>, s: &Tensor<D>) -> T
     (s - Tensor::identity() * mean) * (0.5 * scale / mu)
 }
 
-/// Integrals `∫ N_a n dA` of the nodes on the outer boundary, over the facets that finite elements carry, and on interfaces of two materials, from both sides.
+/// Integrals `∫ N_a n dA` of the nodes on the outer boundary, over the facets that finite elements carry, and between cells of other materials or axes, from both sides.
 ///
 /// Shapes: one entry per node and facet: its node, the cell whose stress acts, the integral \[m^(D−1)\].
 pub(super) fn boundary_integrals<const D: usize>(model: &Model<D>) -> Vec<(u32, u32, Vector<D>)> {
@@ -71,18 +71,12 @@ pub(super) fn boundary_integrals<const D: usize>(model: &Model<D>) -> Vec<(u32, 
         .iter()
         .filter(|f| model.node_takes(f.cell as usize))
         .for_each(&mut add);
-    let cells = 0..mesh.cell_count();
-    let material: Vec<u16> = cells.map(|c| model.material_of_cell(c)).collect();
-    let mut kinds = material.clone();
-    kinds.sort_unstable();
-    kinds.dedup();
-    for (k, a) in kinds.iter().enumerate() {
-        for b in &kinds[k + 1..] {
-            for facet in mesh.interface_facets(&material, a, b) {
-                add(&facet.first);
-                add(&facet.second);
-            }
-        }
+    if !(1..mesh.cell_count()).any(|c| model.differ(0, c)) {
+        return list;
+    }
+    for facet in mesh.facets_between(|a, b| model.differ(a, b)) {
+        add(&facet.first);
+        add(&facet.second);
     }
     list
 }

@@ -48,7 +48,6 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
     let (mut worst, masses) = mass(model, &subject.rest.density, &mut part);
     // in equilibrium masses play no part; a load on a row that is no derivative of an energy does, whose scale is that of its part of the body
     let moves = subject.rest.is_in_time;
-    let has_energy = subject.coupling.symmetry() == Symmetry::Symmetric;
     let mut is_needed = vec![moves; masses.len()];
     let loads = Loads::new(model, conditions, BodyForces::Consistent)?;
     let mut count = 0;
@@ -65,8 +64,8 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
             let f = Vector::<D>::from_column_slice(f);
             own.add(&f, &(site.position - centre));
         }
-        for (needed, f) in is_needed.iter_mut().zip(load.chunks_exact(D)) {
-            *needed |= !has_energy && f.iter().any(|&f| f != 0.0);
+        for (site, f) in load.chunks_exact(D).enumerate() {
+            is_needed[site] |= f.iter().any(|&f| f != 0.0) && !model.has_row_of_energy(site);
         }
         let domain = (on, c.components.depends_on_position());
         let exact = at_once.visit(0.0, |field| exact(model, domain, field));
@@ -75,7 +74,7 @@ pub(super) fn part<const D: usize>(subject: &Subject<'_, D>) -> Result<Option<Pa
         count += 1;
     }
     without_mass(model, &masses, &is_needed, &mut part);
-    if subject.coupling.symmetry() != Symmetry::Symmetric {
+    if model.symmetry() != Symmetry::Symmetric {
         let found = conditions.iter().filter_map(|c| unbalanced(model, c));
         part.findings.extend(found);
     }

@@ -6,9 +6,9 @@ use crate::peridynamics::critical_stretch::stretch_of_equal_energy;
 use crate::scene::conditions::Support;
 use crate::scene::draft::Draft;
 use crate::scene::error::SceneError;
-use crate::scene::materials::Material;
+use crate::scene::materials::{Material, elastic_cells};
 use crate::scene::region;
-use crate::tensor::{Tensor4, Vector};
+use crate::tensor::Vector;
 
 /// Input to the criteria for cells.
 pub(super) struct CriterionInput<'a> {
@@ -39,11 +39,11 @@ pub(super) fn need<const D: usize>(
     let unbreakable: Vec<bool> = (0..mesh.cell_count())
         .map(|c| no_fail.iter().any(|n| n[c]))
         .collect();
-    let tensors: Vec<Tensor4<D>> = scene.materials.iter().map(Material::stiffness).collect();
+    let cells = scene.cell_material.clone();
+    let elastic = elastic_cells(&scene.materials, cells, asked.material, mesh);
     let criteria = Criteria {
         mesh,
-        tensors: &tensors,
-        cell_material: &scene.cell_material,
+        elastic: &elastic,
         material: asked.material,
         horizon: asked.horizon,
         gradient_ratio: gradient_ratio::<D>(|r| micromodulus(stuff, r, largest), largest),
@@ -75,15 +75,16 @@ fn held<const D: usize>(scene: &Draft<'_, D>, horizon: &[f64]) -> Vec<bool> {
 
 /// The micromodulus of the bonds of a material, up to a factor.
 fn micromodulus<const D: usize>(material: &Material<D>, r: f64, horizon: f64) -> f64 {
-    material.law.linearised().kernel(r, horizon)
+    (material.law.as_ref()).map_or(0.0, |law| law.linearised().kernel(r, horizon))
 }
 
 /// The stretch at which bonds of a material break, or would if they did not soften. A fracture energy that gives none is left to the run to refuse.
 fn critical_stretch<const D: usize>(material: &Material<D>, horizon: f64) -> Option<f64> {
     let of_energy = |energy: f64| {
-        let bonds = material.law.bond_energy(horizon).ok_or(())?;
+        let bonds = (material.law.as_ref()).and_then(|law| law.bond_energy(horizon));
+        let bonds = bonds.ok_or(())?;
         let linear = (bonds.critical_stretch::<D>(energy, horizon)).map_err(|_| ())?;
-        let law = material.law.force_state();
+        let law = material.force_state();
         let ratio = |s: f64| law.map_or(1.0, |law| law.energy_ratio(s));
         stretch_of_equal_energy(linear, ratio).map_err(|_| ())
     };

@@ -306,7 +306,7 @@ fn alone(spec: &SceneSpec, span: &Span) -> Result<(), SceneError> {
 /// Refuses bonds that are damaged, or break, by something else than their stretch: no solution before the run shows the place where that begins.
 fn refuse_damage<const D: usize>(material: &Material<D>, span: &Span) -> Result<(), SceneError> {
     let does = match material.fracture {
-        _ if material.law.damages() => {
+        _ if material.law.as_ref().is_some_and(|law| law.damages()) => {
             "takes their stiffness by a damage before they break".to_owned()
         }
         Some(fracture) if !fracture.is_of_stretch() => {
@@ -320,7 +320,7 @@ fn refuse_damage<const D: usize>(material: &Material<D>, span: &Span) -> Result<
     Err(SceneError::conflict(format!(
         "`zones.auto` looks for bonds that reach a critical stretch, and the law of the material `{}`, {}, {does}",
         material.name,
-        material.law.name()
+        material.law_name()
     ))
     .label(span.clone(), "cannot tell where damage begins")
     .help("draw the zone, [zones.nonlocal], with room for the damage, or use coupling = \"nonlocal\""))
@@ -372,10 +372,28 @@ fn material<const D: usize>(
 ) -> Result<u16, SceneError> {
     let of = |c: usize| scene.cell_material[c];
     let mut held = (0..shapes.len()).filter(|&c| shapes[c]).map(of);
+    let no_points = |what: &str| {
+        SceneError::conflict(format!("`zones.auto` places points, and {what}"))
+            .label(
+                span.clone(),
+                "an orthotropic material has no peridynamic law",
+            )
+            .help("give what may crack a material that has points, or use coupling = \"local\"")
+    };
+    let has_law = |m: &Material<D>| m.law.is_some();
     let Some(first) = held.next() else {
         let breaks = scene.materials.iter().position(|m| m.fracture.is_some());
-        return Ok(breaks.unwrap_or(0) as u16);
+        let found = breaks.or_else(|| scene.materials.iter().position(has_law));
+        let found = found.ok_or_else(|| no_points("no material has any"))?;
+        return Ok(found as u16);
     };
+    let own = &scene.materials[usize::from(first)];
+    if own.law.is_none() {
+        return Err(no_points(&format!(
+            "finds a crack, void or notch in the material `{}`, which has none",
+            own.name
+        )));
+    }
     match held.find(|m| *m != first) {
         None => Ok(first),
         Some(other) => Err(SceneError::new(

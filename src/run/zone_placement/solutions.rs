@@ -11,14 +11,14 @@ use crate::scene::conditions::Condition;
 use crate::scene::draft::Draft;
 use crate::scene::error::SceneError;
 use crate::scene::initial::InitialKind;
-use crate::scene::materials::Material;
+use crate::scene::materials::elastic_cells;
 use crate::scene::solve::Solve;
 use crate::scene::source::Span;
 use crate::scene::validated::{Scene, Solver};
-use crate::tensor::{Tensor4, Vector};
+use crate::tensor::Vector;
 use crate::{
     coupling::{Coupling, Local, Problem},
-    model::{ElasticCells, Model, Sampler, SiteKind, Zone, ZonedBody},
+    model::{Model, Sampler, SiteKind, Zone, ZonedBody},
 };
 
 /// Stiffness of cells that a crack or a void passes through, over that of their material: a crack opens as if it were a slot one to two cells wide.
@@ -134,22 +134,12 @@ fn elements<const D: usize>(
     cut: &[bool],
     t: f64,
 ) -> Result<CachedSolution<D>, RunError> {
-    let whole: Vec<Tensor4<D>> = scene.materials.iter().map(Material::stiffness).collect();
-    let soft = whole.iter().map(|c| c.scaled(CUT));
-    let shift = whole.len() as u16;
+    let cells = scene.cell_material.clone();
+    let whole = elastic_cells(&scene.materials, cells, 0, &scene.mesh);
     let problem = Problem {
         body: ZonedBody {
             zones: vec![Zone::Local; scene.mesh.cell_count()],
-            elastic: ElasticCells {
-                tensors: whole.iter().cloned().chain(soft).collect(),
-                material: scene
-                    .cell_material
-                    .iter()
-                    .zip(cut)
-                    .map(|(m, cut)| if *cut { m + shift } else { *m })
-                    .collect(),
-                of_points: 0,
-            },
+            elastic: whole.scaled_where(cut, CUT),
             mesh: scene.mesh.clone(),
             peridynamics: None,
         },
@@ -172,19 +162,10 @@ pub(crate) fn difference_from_elements<const D: usize>(
         return None;
     }
     let cells = 0..model.mesh.cell_count();
-    let cell_material: Vec<u16> = cells.clone().map(|c| model.material_of_cell(c)).collect();
-    let tensor = |m: usize| match cell_material.iter().position(|own| usize::from(*own) == m) {
-        Some(cell) => *model.tensor_of_cell(cell),
-        None => rest.materials[m].stiffness(),
-    };
     let problem = Problem {
         body: ZonedBody {
             zones: vec![Zone::Local; cells.len()],
-            elastic: ElasticCells {
-                tensors: (0..rest.materials.len()).map(tensor).collect(),
-                material: cell_material,
-                of_points: 0,
-            },
+            elastic: model.elastic.clone(),
             mesh: model.mesh.clone(),
             peridynamics: None,
         },

@@ -55,6 +55,15 @@ impl Material {
         Self::elastic("correspondence", youngs_modulus, poisson_ratio)
     }
 
+    /// Orthotropic finite elements: Young's moduli E₁, E₂, E₃, Poisson's ratios ν₁₂, ν₁₃, ν₂₃, shear moduli G₁₂, G₁₃, G₂₃. Its axes are set as `angle`, or as `axis-1` and `axis-2`.
+    pub fn orthotropic(young: [f64; 3], poisson: [f64; 3], shear: [f64; 3]) -> Self {
+        let keys = [
+            "e1", "e2", "e3", "nu12", "nu13", "nu23", "g12", "g13", "g23",
+        ];
+        let values = young.into_iter().chain(poisson).chain(shear);
+        (keys.into_iter().zip(values)).fold(Self::of("orthotropic"), |m, (key, x)| m.set(key, x))
+    }
+
     fn elastic(kind: &str, youngs_modulus: f64, poisson_ratio: f64) -> Self {
         Self::of(kind)
             .set("youngs-modulus", youngs_modulus)

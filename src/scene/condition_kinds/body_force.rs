@@ -11,6 +11,7 @@ use crate::scene::expression::Expression;
 use crate::scene::load::{Domain, Load, typed};
 use crate::scene::region::Region;
 use crate::scene::spec::ShapeSpec;
+use crate::scene::value::Text;
 
 /// A force per volume.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -24,6 +25,8 @@ pub struct BodyForceSpec {
     pub y: Option<Expression>,
     /// Force along z.
     pub z: Option<Expression>,
+    /// Stages of the scene in which it acts; all if left out. After the stage in which it begins it keeps the values of its end.
+    pub stages: Option<Vec<Text>>,
 }
 
 impl ConditionKind for BodyForceSpec {
@@ -42,5 +45,9 @@ impl ConditionKind for BodyForceSpec {
             density: typed,
         };
         Ok(at.prescribes(Prescribed::Load(load), components))
+    }
+
+    fn stages(&self) -> Option<&[Text]> {
+        self.stages.as_deref()
     }
 }

@@ -26,6 +26,8 @@ pub struct DisplacementSpec {
     pub y: Option<Expression>,
     /// Displacement along z.
     pub z: Option<Expression>,
+    /// Stages of the scene in which it acts; all if left out. After the stage in which it begins it keeps the values of its end.
+    pub stages: Option<Vec<Text>>,
 }
 
 impl ConditionKind for DisplacementSpec {
@@ -33,6 +35,10 @@ impl ConditionKind for DisplacementSpec {
         let components = at.components([&self.x, &self.y, &self.z])?;
         let support = held(at, (self.on.as_ref(), self.inside.as_ref()), &components)?;
         Ok(at.prescribes(Prescribed::Displacement(support), components))
+    }
+
+    fn stages(&self) -> Option<&[Text]> {
+        self.stages.as_deref()
     }
 }
 

@@ -47,6 +47,11 @@ pub(crate) trait ConditionKind {
     /// # Errors
     /// [`SceneError`] for a set, a shape or values that make no condition.
     fn build<const D: usize>(&self, at: &ConditionAt<'_, D>) -> Result<Condition<D>, SceneError>;
+
+    /// The stages of the scene in which it acts, where it names any.
+    fn stages(&self) -> Option<&[Text]> {
+        None
+    }
 }
 
 /// Declares [`ConditionSpec`], the conditions by their keys.
@@ -61,6 +66,13 @@ macro_rules! conditions {
         impl ConditionSpec {
             /// Their keys.
             pub const KEYS: &'static [&'static str] = &[$($key),*];
+
+            /// The stages of the scene in which it acts, where it names any.
+            pub(crate) fn stages(&self) -> Option<&[Text]> {
+                match self {
+                    $(Self::$kind(kind) => kind.stages(),)*
+                }
+            }
 
             /// The condition on a mesh.
             ///

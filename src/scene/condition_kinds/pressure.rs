@@ -23,6 +23,8 @@ pub struct PressureSpec {
     pub on: Text,
     /// Pressure, positive where it presses on the body; may depend on place and time.
     pub value: Expression,
+    /// Stages of the scene in which it acts; all if left out. After the stage in which it begins it keeps the values of its end.
+    pub stages: Option<Vec<Text>>,
 }
 
 impl ConditionKind for PressureSpec {
@@ -41,5 +43,9 @@ impl ConditionKind for PressureSpec {
             density: |p, n| n * -p[0],
         };
         Ok(at.prescribes(Prescribed::Load(load), components))
+    }
+
+    fn stages(&self) -> Option<&[Text]> {
+        self.stages.as_deref()
     }
 }

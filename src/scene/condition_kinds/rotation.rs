@@ -28,6 +28,8 @@ pub struct RotationSpec {
     pub axis: Option<Coordinates>,
     /// Angle in degrees, right-handed about the axis (counter-clockwise in a plane); may depend on the time.
     pub angle: Expression,
+    /// Stages of the scene in which it acts; all if left out. After the stage in which it begins it keeps the values of its end.
+    pub stages: Option<Vec<Text>>,
 }
 
 impl ConditionKind for RotationSpec {
@@ -56,6 +58,10 @@ impl ConditionKind for RotationSpec {
         let nodes = at.mesh.nodes.iter().copied().take(1);
         at.finite(&components, nodes)?;
         Ok(at.prescribes(Prescribed::Displacement(support), components))
+    }
+
+    fn stages(&self) -> Option<&[Text]> {
+        self.stages.as_deref()
     }
 }
 

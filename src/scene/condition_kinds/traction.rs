@@ -23,6 +23,8 @@ pub struct TractionSpec {
     pub y: Option<Expression>,
     /// Traction along z.
     pub z: Option<Expression>,
+    /// Stages of the scene in which it acts; all if left out. After the stage in which it begins it keeps the values of its end.
+    pub stages: Option<Vec<Text>>,
 }
 
 impl ConditionKind for TractionSpec {
@@ -38,5 +40,9 @@ impl ConditionKind for TractionSpec {
             density: typed,
         };
         Ok(at.prescribes(Prescribed::Load(load), components))
+    }
+
+    fn stages(&self) -> Option<&[Text]> {
+        self.stages.as_deref()
     }
 }

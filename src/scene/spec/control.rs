@@ -56,7 +56,7 @@ pub struct WarningsSpec {
 }
 
 impl WarningsSpec {
-    /// What becomes of warnings.
+    /// Returns the codes as the run applies them.
     pub(crate) fn policy(&self) -> Policy {
         Policy {
             allowed: self.allow.clone(),
@@ -101,6 +101,19 @@ pub struct OutputSpec {
     /// Tips of cracks to follow, by name, in a scene in which bonds break.
     #[serde(default)]
     pub tips: BTreeMap<Text, TipSpec>,
+    /// Bonds that VTU files of their own show as lines, by name.
+    #[serde(default)]
+    pub bonds: BTreeMap<Text, BondLinesSpec>,
+}
+
+/// Peridynamic points whose bonds are shown.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum BondLinesSpec {
+    /// Those in a shape.
+    Inside(Box<ShapeSpec>),
+    /// The nearest one to a probe of the scene, which lies within its horizon.
+    Probe(Text),
 }
 
 /// Representation of peridynamic points in a VTU file.

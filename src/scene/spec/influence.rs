@@ -16,7 +16,10 @@ pub enum MicromodulusSpec {
     /// `λ = c / |ξ|³`: force proportional to stretch (SAND2015-7998 section 3.4).
     #[default]
     InverseDistance,
-    /// `λ = c / |ξ|²`.
+    /// `λ = c / |ξ|²`: the inverted triangle of Bobaru et al. 2009.
+    InvertedTriangular,
+    /// A name of two meanings, which is refused with both.
+    #[schemars(skip)]
     Constant,
     /// `λ = c`.
     Uniform,

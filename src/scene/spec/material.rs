@@ -10,6 +10,8 @@ use serde::de::{self, DeserializeSeed, Deserializer, EnumAccess, VariantAccess, 
 
 use super::influence::InfluenceSpec;
 use super::named_law::{self, NamedSpec};
+use super::orthotropic::OrthotropicSpec;
+use super::region::CellsSpec;
 use super::user_material::UmatSpec;
 use crate::model::Surfaces;
 use crate::peridynamics::bond_force::{BondKinematics, Storage};
@@ -19,21 +21,50 @@ use crate::peridynamics::{BondWeights, PartialVolume};
 use crate::scene::expression::Expression;
 use crate::scene::value::{Coordinates, Number, Text};
 
-/// A material: its peridynamic law, beside which the local law is linear elasticity with the same constants.
+/// A material: its peridynamic law, beside which the local law is linear elasticity with the same constants; or a local law alone.
 #[derive(Clone, Debug)]
 pub enum MaterialSpec {
     /// A routine of a user's library.
     Umat(UmatSpec),
+    /// An orthotropic material of finite elements.
+    Orthotropic(Box<OrthotropicSpec>),
     /// A law of [`Named`].
     Named(NamedSpec),
 }
 
 impl MaterialSpec {
-    /// Thermal expansion, where it is typed.
+    /// Keys of materials.
+    pub fn keys() -> &'static [&'static str] {
+        &KEYS
+    }
+
+    /// Thermal expansion, where it is typed; of several the first.
     pub fn thermal_expansion(&self) -> Option<&Number> {
         match self {
             Self::Named(m) => m.thermal_expansion.as_ref(),
             Self::Umat(m) => m.thermal_expansion.as_ref(),
+            Self::Orthotropic(m) => {
+                let typed = [&m.alpha1, &m.alpha2, &m.alpha3];
+                typed.into_iter().flatten().next()
+            }
+        }
+    }
+
+    /// Density, where it is typed.
+    pub fn density(&self) -> Option<&Number> {
+        match self {
+            Self::Named(m) => m.density.as_ref(),
+            Self::Umat(m) => m.density.as_ref(),
+            Self::Orthotropic(m) => m.density.as_ref(),
+        }
+    }
+
+    /// The cells that it fills, where they are typed.
+    pub fn cells(&self) -> Option<&CellsSpec> {
+        match self {
+            Self::Named(m) => m.cells.as_ref(),
+            Self::Umat(m) => m.cells.as_ref(),
+            Self::Orthotropic(m) => m.cells.as_ref(),
         }
     }
 
@@ -42,13 +73,17 @@ impl MaterialSpec {
         match self {
             Self::Named(m) => [m.conductivity.as_ref(), m.heat_capacity.as_ref()],
             Self::Umat(m) => [m.conductivity.as_ref(), m.heat_capacity.as_ref()],
+            Self::Orthotropic(m) => [m.conductivity.as_ref(), m.heat_capacity.as_ref()],
         }
     }
 }
 
 /// Keys of materials.
 static KEYS: LazyLock<Vec<&'static str>> =
-    LazyLock::new(|| Named::KEYS.iter().copied().chain(["umat"]).collect());
+    LazyLock::new(|| (Named::KEYS.iter().copied().chain([ORTHOTROPIC, "umat"])).collect());
+
+/// The key of orthotropic materials.
+const ORTHOTROPIC: &str = "orthotropic";
 
 impl<'de> Deserialize<'de> for MaterialSpec {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -64,6 +99,7 @@ impl<'de> Deserialize<'de> for MaterialSpec {
                 let (key, content) = data.variant_seed(MaterialKey)?;
                 Ok(match key {
                     Key::Umat => MaterialSpec::Umat(content.newtype_variant()?),
+                    Key::Orthotropic => MaterialSpec::Orthotropic(content.newtype_variant()?),
                     Key::Named(law) => {
                         MaterialSpec::Named(content.newtype_variant_seed(named_law::Seed(law))?)
                     }
@@ -77,6 +113,7 @@ impl<'de> Deserialize<'de> for MaterialSpec {
 /// The law that a key of a material names.
 enum Key {
     Umat,
+    Orthotropic,
     Named(Named),
 }
 
@@ -90,6 +127,7 @@ impl<'de> DeserializeSeed<'de> for MaterialKey {
         let key = String::deserialize(deserializer)?;
         Ok(match key.as_str() {
             "umat" => Key::Umat,
+            ORTHOTROPIC => Key::Orthotropic,
             other => match Named::ALL.iter().find(|law| law.key() == other) {
                 Some(law) => Key::Named(*law),
                 None => return Err(de::Error::unknown_variant(other, &KEYS)),
@@ -113,11 +151,18 @@ impl JsonSchema for MaterialSpec {
                 "additionalProperties": false
             })
         };
-        let mut variants = vec![of(
-            "umat",
-            "Correspondence with the stress of a user's routine, called as Abaqus calls UMAT; the program has to be built with the feature umat.",
-            generator.subschema_for::<UmatSpec>(),
-        )];
+        let mut variants = vec![
+            of(
+                "umat",
+                "Correspondence with the stress of a user's routine, called as Abaqus calls UMAT; the program has to be built with the feature umat.",
+                generator.subschema_for::<UmatSpec>(),
+            ),
+            of(
+                ORTHOTROPIC,
+                "Orthotropic linear elasticity of finite elements, without peridynamic points.",
+                generator.subschema_for::<OrthotropicSpec>(),
+            ),
+        ];
         for law in Named::ALL {
             let content = named_law::schema(*law, generator);
             variants.push(of(law.key(), law.about(), content));
@@ -135,6 +180,7 @@ impl MaterialSpec {
         match self {
             Self::Named(m) => m.law.key(),
             Self::Umat(_) => "umat",
+            Self::Orthotropic(_) => ORTHOTROPIC,
         }
     }
 
@@ -142,6 +188,7 @@ impl MaterialSpec {
     pub fn failure(&self) -> Vec<(&'static dyn FailureCriterion, &Number)> {
         match self {
             Self::Named(m) => m.failure.iter().map(|(c, number)| (*c, number)).collect(),
+            Self::Orthotropic(_) => Vec::new(),
             Self::Umat(m) => {
                 let typed = m.critical_stretch.iter();
                 typed
@@ -158,6 +205,9 @@ impl MaterialSpec {
 pub struct PeridynamicsSpec {
     /// Horizon δ: a number, or an expression in x, y, z; three spacings of the points if left out, where no bond breaks.
     pub horizon: Option<Expression>,
+    /// Rule for bonds between points of different horizons; "dual" if left out, and of bodies what their coupling has.
+    #[schemars(with = "Option<HorizonChangeSpec>")]
+    pub horizon_change: Option<toml::Spanned<HorizonChangeSpec>>,
     /// Bond weights.
     #[serde(default)]
     pub weights: BondWeights,
@@ -186,11 +236,33 @@ pub struct PeridynamicsSpec {
 }
 
 impl PeridynamicsSpec {
+    /// Returns true if points of different horizons are typed to be spliced.
+    pub fn splices(&self) -> bool {
+        let typed = self.horizon_change.as_ref().map(|typed| *typed.get_ref());
+        typed == Some(HorizonChangeSpec::Splice)
+    }
+
     /// Returns true if a horizon is typed that is not constant.
     pub fn horizon_varies(&self) -> bool {
         let typed = self.horizon.as_ref();
         typed.is_some_and(|h| h.as_constant().is_none())
     }
+}
+
+/// Rules for bonds between points of different horizons.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum HorizonChangeSpec {
+    /// Each point has the force state of its own horizon, which acts at both ends of its bonds (SAND2015-7998 eq. (2.5), (2.15)).
+    Dual,
+    /// A bond has the larger horizon of its ends, weakened for the other (Jenabidehkordi and Rabczuk 2019 eq. (7)).
+    MultiHorizon,
+    /// Each point sees all others with its own horizon (SAND2015-7998 section 2.5).
+    Splice,
+    /// Divergence of the partial stress (SAND2015-7998 eq. (2.20)): coupling `partial-stress`.
+    PartialStress,
+    /// A layer of elements between bodies: coupling `truncated` with `zones.bodies`.
+    Layer,
 }
 
 /// Positions of the peridynamic points.

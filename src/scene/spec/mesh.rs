@@ -98,7 +98,7 @@ pub struct BoxMeshSpec {
 pub struct FileMeshSpec {
     /// The file, relative to the scene.
     pub path: Text,
-    /// Treatment of cells of second order; "kept" if left out.
+    /// The order of the cells; "kept" if left out.
     #[serde(default)]
     pub order: Order,
     /// Sets of cells that are left out, and types of elements of a deck (`.inp`), such as `"T2D2"`.

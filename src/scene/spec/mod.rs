@@ -6,6 +6,7 @@
 //! |---|---|
 //! | `mesh.rs` | the mesh |
 //! | `influence.rs`, `material.rs`, `named_law.rs`, `user_material.rs` | materials and peridynamics; laws known by their key; compiled routines |
+//! | `orthotropic.rs` | orthotropic materials of finite elements |
 //! | `material_interface.rs` | bonds between two materials |
 //! | `region.rs` | shapes and zones |
 //! | `condition.rs`, `impactor.rs` | conditions and voids, rigid impactors |
@@ -24,6 +25,7 @@ mod material_interface;
 mod mesh;
 mod motion;
 pub(super) mod named_law;
+mod orthotropic;
 mod region;
 mod table;
 mod user_material;
@@ -38,12 +40,14 @@ pub use conduction::{
     HeldTemperatureSpec,
 };
 pub use control::{
-    LineSpec, OutputSpec, PointOutputSpec, ProbeSpec, SectionSpec, SolverSpec, StressSpec,
-    UnprovenSpec, WarningsSpec,
+    BondLinesSpec, LineSpec, OutputSpec, PointOutputSpec, ProbeSpec, SectionSpec, SolverSpec,
+    StressSpec, UnprovenSpec, WarningsSpec,
 };
 pub use impactor::{CylinderSpec, ImpactorMotionSpec, ImpactorSpec, PlaneSpec, SphereSpec};
 pub use influence::{InfluenceSpec, MicromodulusSpec, PolynomialSpec};
-pub use material::{LatticeSpec, MaterialSpec, PeridynamicsSpec, PointFileSpec, PointsSpec};
+pub use material::{
+    HorizonChangeSpec, LatticeSpec, MaterialSpec, PeridynamicsSpec, PointFileSpec, PointsSpec,
+};
 pub use material_interface::MaterialInterfaceSpec;
 pub use mesh::{
     AxisSpec, BoxMeshSpec, CutoutSpec, FileMeshSpec, GradedSpec, LineMeshSpec, MergeSpec, MeshSpec,
@@ -54,6 +58,7 @@ pub use motion::{
     InitialSpec, LoadStepSpec, NoOptionsSpec, QuasiStaticSpec, SolveSpec, TipSpec, WhenPartedSpec,
 };
 pub use named_law::Given;
+pub use orthotropic::OrthotropicSpec;
 pub use region::{
     AutoSpec, BallSpec, BodySpec, BoxSpec, CellsSpec, EdgeSpec, FollowSpec, NearSpec, RimSpec,
     SegmentSpec, ShapeSpec, SkinSpec, TransitionSpec, WithoutSpec, ZonesSpec,
@@ -109,6 +114,10 @@ pub struct SceneSpec {
     #[serde(default)]
     #[schemars(schema_with = "solve_schema")]
     pub solve: Option<Spanned<SolveSpec>>,
+    /// Stages that `solve` lists, by name: load steps, whose last state of equilibrium a motion begins with.
+    #[serde(default)]
+    #[schemars(schema_with = "stages_schema")]
+    pub stages: BTreeMap<Text, SolveSpec>,
     /// Displacements, velocities, tractions and body forces by name.
     #[serde(default)]
     pub conditions: BTreeMap<Text, ConditionSpec>,
@@ -152,6 +161,24 @@ impl SceneSpec {
         found.map_or(0..0, |(key, _)| key.span.clone())
     }
 
+    /// The analysis, of a scene in stages that of the last one; none where the scene types none, which then is static.
+    pub fn analysis(&self) -> Option<&SolveSpec> {
+        match self.solve.as_ref()?.get_ref() {
+            SolveSpec::Stages(names) => self.stages.get(names.last()?),
+            one => Some(one),
+        }
+    }
+
+    /// The key of the table that holds the analysis: `solve`, or `stages.NAME` of the last stage.
+    pub fn analysis_key(&self) -> String {
+        match self.solve.as_ref().map(Spanned::get_ref) {
+            Some(SolveSpec::Stages(names)) if !names.is_empty() => {
+                format!("stages.{}", names[names.len() - 1])
+            }
+            _ => "solve".to_owned(),
+        }
+    }
+
     /// Space dimension.
     pub fn dimension(&self) -> usize {
         self.kinematics.get_ref().dimension()
@@ -162,8 +189,29 @@ impl SceneSpec {
 fn solve_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
     let table = generator.subschema_for::<SolveSpec>();
     schemars::json_schema!({
-        "description": "What is computed: a table, [solve.explicit], or a name where no option is set, \"static\" (default).",
-        "anyOf": [table, { "enum": ["static"] }]
+        "description": "What is computed: a table, [solve.explicit], a name where no option is set, \"static\" (default), or the names of [stages.NAME] in their order.",
+        "anyOf": [table, { "enum": ["static"] }, { "type": "array", "items": { "type": "string" } }]
+    })
+}
+
+/// Tables by name, each an analysis.
+fn stages_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+    let [steps, motion] = [
+        generator.subschema_for::<QuasiStaticSpec>(),
+        generator.subschema_for::<ExplicitSpec>(),
+    ];
+    let one = |key: &str, options: schemars::Schema| {
+        schemars::json_schema!({
+            "type": "object",
+            "properties": { key: options },
+            "required": [key],
+            "additionalProperties": false
+        })
+    };
+    schemars::json_schema!({
+        "description": "Stages that `solve` lists, by name: load steps, whose last state of equilibrium a motion begins with.",
+        "type": "object",
+        "additionalProperties": { "oneOf": [one("quasi-static", steps), one("explicit", motion)] }
     })
 }
 

@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use super::region::ShapeSpec;
 use crate::scene::expression::Expression;
-use crate::scene::value::{Automatic, Coordinates, Count, Every, Number, Steps};
+use crate::scene::value::{Automatic, Coordinates, Count, Every, Number, Steps, Text};
 
 /// A solve without options.
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
@@ -22,6 +22,8 @@ pub enum SolveSpec {
     Explicit(ExplicitSpec),
     /// States of equilibrium under a load that grows step by step.
     QuasiStatic(QuasiStaticSpec),
+    /// Stages one after the other, by the names of their tables, [stages.NAME]; also `solve = ["load", "impact"]`.
+    Stages(Vec<Text>),
 }
 
 /// Motion in time by velocity Verlet.

@@ -126,9 +126,13 @@ fn run<const D: usize>(
     {
         return Err(Outcome::Skipped("many steps"));
     }
+    let affordable = MOST_WORK / prediction.sizes.bonds.max(1);
     if let Solve::QuasiStatic(q) = &mut scene.solve {
-        let affordable = MOST_WORK / prediction.sizes.bonds.max(1);
         q.max_iterations = q.max_iterations.min(affordable);
+    }
+    if let Some(stage) = &mut scene.before {
+        let q = &mut stage.solve;
+        q.max_iterations = q.max_iterations.min(MOST_ITERATIONS.min(affordable));
     }
     let summary = solve(wrap(Box::new(scene))).map_err(|error| failed(&error))?;
     finite(&summary);

@@ -23,10 +23,14 @@ const MOST_LOAD_STEPS: usize = 12;
 pub fn is_small(spec: &SceneSpec) -> bool {
     let samples = spec.output.lines.values().map(|l| l.samples.value);
     let samples = samples.fold(0usize, usize::saturating_add);
-    let steps = match spec.solve.as_ref().map(Spanned::get_ref) {
-        Some(SolveSpec::QuasiStatic(q)) => q.steps.count(),
+    let steps = |solve: &SolveSpec| match solve {
+        SolveSpec::QuasiStatic(q) => q.steps.count(),
         _ => 0,
     };
+    let steps = (spec.analysis().into_iter().chain(spec.stages.values()))
+        .map(steps)
+        .max()
+        .unwrap_or(0);
     cells_and_points_are_few(spec) && samples <= MOST_SAMPLES && steps <= MOST_LOAD_STEPS
 }
 

@@ -15,11 +15,12 @@ pub const EXAMPLES: &str = "Examples:
   bondline schema > bondline.schema.json      completion and checks in an editor";
 
 /// Course of a trade, with examples.
-pub const TRADE: &str = "The scene runs as it is, then with each setting of each knob alone, then with the combinations that promise most by what these showed.
+pub const TRADE: &str = "The reference runs, then the scene as it is, then with each setting of each knob alone, then with the combinations that promise to be the cheapest of their coupling with the errors that are wanted. The tables compare couplings at equal error and at equal cost, and the chosen scene is written, ready to run.
 Every outcome is kept in the output folder: the same command goes on where the last one ended.
 
 Examples:
-  bondline trade plate.toml                                  all knobs, ten minutes
-  bondline trade plate.toml --knob coupling,m --budget 2min
-  bondline trade plate.toml --vary 'solver.tolerance=[1e-4, 1e-6]' --quantity displacement,strain
-  bondline trade glass.toml --quantity path.upper,tip-time.upper --wanted 0.02";
+  bondline trade plate.toml                                  all knobs, ten minutes, what suits the outputs to 1 %
+  bondline trade plate.toml --want probe:tip.u=1% --want line:cut.von_mises=3% --budget 2min
+  bondline trade plate.toml --want 0.1% --knob coupling,m --reference fe
+  bondline trade plate.toml --vary 'solver.tolerance=[1e-4, 1e-6]' --want displacement=1%,strain=1%
+  bondline trade glass.toml --want path.upper=2%,tip-time.upper=2%";

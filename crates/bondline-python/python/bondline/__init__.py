@@ -13,16 +13,18 @@ from bondline._errors import BondlineError, RunError, SceneError
 from bondline._mesh import Mesh
 from bondline._result import Frame, Result
 from bondline._scene import Scene, run
-from bondline._sweep import sweep
+from bondline._sweep import Case, Sweep, sweep
 
 __all__ = [
     "BondlineError",
+    "Case",
     "Frame",
     "Mesh",
     "Result",
     "RunError",
     "Scene",
     "SceneError",
+    "Sweep",
     "__version__",
     "run",
     "sweep",

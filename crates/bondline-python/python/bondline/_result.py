@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import meshio
     import pyvista
+    from matplotlib.axes import Axes
 
 #: VTK's numbers of the types of cells, by their names in meshio.
 VTK_TYPES: Mapping[str, int] = MappingProxyType(
@@ -105,6 +106,28 @@ class Frame:
             grid.cell_data[name] = np.concatenate(parts)
         return grid
 
+    def plot(
+        self,
+        name: str = "displacement",
+        component: int | str | None = None,
+        *,
+        deformed: float = 0.0,
+        ax: Axes | None = None,
+        cmap: str | None = None,
+    ) -> Axes:
+        """Draws a field of a body of one or two dimensions and returns the axes; needs matplotlib.
+
+        name: a field of ``point_data`` or ``cell_data``.
+        component: of a vector ``"x"``, ``"y"`` or ``"z"``, of a tensor ``"xx"``, ``"xy"``, …, or its number. Left out, a vector is drawn by its length.
+        deformed: factor of the displacement by which points are moved.
+        ax: axes to draw in; new ones, with a bar of colours, if left out.
+
+        Elements are coloured areas (in one dimension a line), peridynamic points dots.
+        """
+        from bondline._plot import drawn
+
+        return drawn(self, name, component, deformed, ax, cmap)
+
     def __repr__(self) -> str:
         cells = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in self.cells.items())
         when = "" if self.time is None else f", time {self.time:g}"
@@ -121,6 +144,30 @@ class Result(Frame):
     tables: dict[str, dict[str, NDArray[Any]]] = field(default_factory=dict)
     #: All solutions that were kept.
     kept: tuple[Frame, ...] = ()
+    #: The names of the probes of the scene, in the order in which it types them.
+    probe_names: tuple[str, ...] = ()
+
+    @property
+    def probes(self) -> dict[str, dict[str, Any]]:
+        """The quantities at each probe by their names, in the order in which the scene types the probes.
+
+        A number each of a static scene, with the coordinates of the probe; of a scene in time or load steps an array over ``history["time"]``.
+        """
+        if "history" in self.tables:
+            found: dict[str, dict[str, Any]] = {name: {} for name in self.probe_names}
+            for column, values in self.history.items():
+                owners = [name for name in self.probe_names if column.startswith(f"{name}_")]
+                if owners:
+                    owner = max(owners, key=len)
+                    found[owner][column[len(owner) + 1 :]] = values
+            return found
+        table = self.tables.get("probes", {})
+        # rows are in the order of the names
+        row = {name: k for k, name in enumerate(sorted(self.probe_names))}
+        return {
+            name: {column: values[row[name]].item() for column, values in table.items()}
+            for name in self.probe_names
+        }
 
     @property
     def history(self) -> dict[str, NDArray[Any]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +21,10 @@ class Scene:
     Made by :meth:`load` or :meth:`from_dict`; it is validated then and does not change.
     """
 
-    def __init__(self, native: _bondline.Scene) -> None:
+    def __init__(self, native: _bondline.Scene, probes: Iterable[str] | None = None) -> None:
         self._native = native
+        # as they are typed; a table of TOML that is made of a dictionary has its keys sorted
+        self._probes = tuple(native.probes if probes is None else probes)
 
     @classmethod
     def load(
@@ -54,7 +56,9 @@ class Scene:
         found = _bondline.Scene.from_table(
             dict(keys), Path(directory), name, native, dict(overrides or {})
         )
-        return cls(found)
+        names = found.probes
+        typed = list(keys.get("output", {}).get("probes", {})) if isinstance(keys.get("output"), Mapping) else []
+        return cls(found, sorted(names, key=lambda name: typed.index(name) if name in typed else len(typed)))
 
     @property
     def name(self) -> str:
@@ -133,6 +137,7 @@ class Scene:
             summary=json.loads(summary),
             tables=tables,
             kept=tuple(frames),
+            probe_names=self._probes,
         )
 
     def __repr__(self) -> str:

@@ -112,7 +112,7 @@ impl Bench {
         let seconds = summary.total_seconds - summary.timings.seconds("output");
         let work = work(&summary);
         let json = serde_json::to_value(&summary).map_err(|e| e.to_string())?;
-        let measured = Measured::read(self.folder.path(), &json).map_err(|e| e.to_string())?;
+        let measured = Measured::read(self.folder.path(), &json, &[]).map_err(|e| e.to_string())?;
         Ok(Pilot {
             measured,
             seconds,

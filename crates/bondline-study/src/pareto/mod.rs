@@ -6,17 +6,18 @@
 //! | `trial.rs` | one case in a process of its own: its cost, its outcome |
 //! | `surrogate.rs` | guesses of cost and error for cases that were not run; the Pareto front |
 //! | `study.rs` | which case runs next |
+//! | `reference.rs` | what errors are measured against, and its own error |
 //! | `record.rs` | records of a study, so that it can go on |
 //! | `report.rs` | table, CSV, JSON, plot, and the scene for a wanted error |
 //!
 //! The knobs of a scene, and the differences between outputs, are in `crates/bondline-study/src/variants`.
 //!
-//! First the reference runs, then the scene as it is, then every setting alone. From these, cost and error of every combination are guessed, and the
-//! one that promises the largest gain over the front so far is run, again and again, until none promises any or the time is used up. Every outcome is
-//! written as soon as it is known, and a study that was interrupted goes on from there.
+//! First the reference runs, then the scene as it is, then every setting alone. From these, cost and error of every combination are guessed. Combinations run that promise to be the cheapest of their coupling with the errors that are
+//! wanted, then those that promise the largest gain over the front so far, until none promises any or the time is used up. Every outcome is written as soon as it is known, and a study that was interrupted goes on from there.
 
 pub(crate) mod parameters;
 mod record;
+mod reference;
 mod report;
 mod study;
 mod surrogate;
@@ -28,7 +29,8 @@ use std::time::{Duration, Instant};
 
 pub use crate::variants::{KNOBS, Knob, Quantity, Setting, distance_from_path, typed};
 pub use parameters::{
-    Case, Cost, CostBy, Outcome, Reference, Trade, TradeEnd, TradeError, TradeParams,
+    Case, Cost, CostBy, Outcome, OwnError, Reference, ReferenceRun, Trade, TradeEnd, TradeError,
+    TradeParams, Want,
 };
 pub use surrogate::front;
 
@@ -41,6 +43,7 @@ use bondline::run::AnyScene;
 use bondline::scene::spec::PeridynamicsSpec;
 use bondline::scene::{SceneError, SceneSpec, Source};
 use record::{Head, kept, new_record, read_record};
+use reference::ChosenReference;
 use study::Study;
 use trial::{Attempt, Ran, Runner};
 
@@ -55,8 +58,9 @@ struct Prepared {
     knobs: Vec<Knob>,
     /// Keys that all cases have.
     common: Vec<String>,
-    /// Keys of the reference.
-    keys: Vec<String>,
+    reference: ChosenReference,
+    /// Names of the probes, in the order of their rows.
+    probes: Vec<String>,
 }
 
 impl Prepared {
@@ -85,23 +89,28 @@ impl Prepared {
             base = Base::of(&spec);
         }
         let knobs = chosen_knobs(&base, params)?;
+        let settings: Vec<Setting> = knobs.iter().flat_map(|k| k.settings.clone()).collect();
         let mut common = params.overrides.clone();
         common.extend(chosen.into_iter().flat_map(|c| c.1.overrides));
         common.extend(typed);
         common.extend(measured_keys(&spec));
-        let keys = match &params.reference {
-            Reference::Auto if base.breaks && base.moves => vec!["coupling=nonlocal".to_owned()],
-            Reference::FullPd => vec!["coupling=nonlocal".to_owned()],
-            Reference::Auto | Reference::Finer => base.overrides(&base.finer()),
-            Reference::Keys(keys) => keys.clone(),
+        let runs = |keys: &[String]| {
+            let mut source = plain.clone();
+            let mut all = common.iter().chain(keys);
+            all.all(|key| source.push_override(key).is_ok())
+                && AnyScene::from_source(&source, directory, "trade").is_ok()
         };
+        let reference = ChosenReference::of(&params.reference, &base, &settings, runs)?;
+        let probes = spec.output.probes.keys().map(|name| name.value.clone());
+        let probes = probes.collect();
         Ok(Self {
             text,
             plain,
             base,
             knobs,
             common,
-            keys,
+            reference,
+            probes,
         })
     }
 
@@ -118,15 +127,16 @@ impl Prepared {
     ) -> Result<(Measured, Head, Vec<Case>), TradeError> {
         let directory = params.scene.parent().unwrap_or(Path::new(""));
         let program = record::program(runner.program)?;
-        let with =
-            |keys: &[String]| -> Vec<String> { self.common.iter().chain(keys).cloned().collect() };
-        let mesh = record::mesh(&self.plain, directory, &with(&self.keys));
+        let ChosenReference { keys, other, .. } = &self.reference;
+        let all: Vec<String> = self.common.iter().chain(keys).cloned().collect();
+        let mesh = record::mesh(&self.plain, directory, &all);
         let head_of = |quantities: Vec<Quantity>, cost| Head {
             program: program.clone(),
             scene: self.text.clone(),
             mesh,
             overrides: self.common.clone(),
-            reference: self.keys.clone(),
+            reference: keys.clone(),
+            other: other.as_ref().map(|(_, text)| text.clone()),
             quantities,
             cost,
         };
@@ -134,21 +144,28 @@ impl Prepared {
         let old = read_record(record_path)?;
         match old {
             Some((head, cases)) => {
-                let wanted = if params.quantities.is_empty() {
-                    head.quantities.clone()
-                } else {
-                    params.quantities.clone()
-                };
-                if head != head_of(wanted, head.cost) {
+                let reference = kept(&folder, &self.probes)?;
+                let quantities = quantities_of(&reference, params)?;
+                if head != head_of(quantities, head.cost) {
                     return Err(TradeError::Another {
                         path: record_path.to_path_buf(),
                     });
                 }
-                Ok((kept(&folder)?, head, cases))
+                Ok((reference, head, cases))
             }
             None => {
                 progress.stage("reference", None);
-                let ran = self.measure(runner, &with(&self.keys), &folder, params)?;
+                let ran = match other {
+                    Some((scene, _)) => {
+                        let other = Runner {
+                            scene,
+                            probes: self.probes.clone(),
+                            ..*runner
+                        };
+                        self.measure(&other, &[], &folder, params)?
+                    }
+                    None => self.measure(runner, &all, &folder, params)?,
+                };
                 let quantities = quantities_of(&ran.measured, params)?;
                 let head = head_of(quantities, ran.cost);
                 Ok((ran.measured, head, Vec::new()))
@@ -198,22 +215,38 @@ fn horizon_of_cells(
     Ok(found.map(|horizon| format!("peridynamics.horizon={horizon:e}")))
 }
 
-/// Returns the quantities to compare: those asked for, or all that the reference has.
+/// The quantities to compare: those asked for, and where errors are asked for without one, all that suit the outputs.
 fn quantities_of(measured: &Measured, params: &TradeParams) -> Result<Vec<Quantity>, TradeError> {
-    let quantities = if params.quantities.is_empty() {
+    let mut quantities: Vec<Quantity> = Vec::new();
+    let suits = params.wants.iter().any(|want| want.quantity.is_none());
+    let suiting = if suits {
         measured.quantities()
     } else {
-        params.quantities.clone()
+        Vec::new()
     };
-    for quantity in &quantities {
-        if measured.error(measured, quantity).is_none() {
+    let typed = params.wants.iter().filter_map(|want| want.quantity.clone());
+    for quantity in typed.chain(suiting) {
+        if measured.error(measured, &quantity).is_none() {
             return Err(TradeError::Quantity {
                 quantity: quantity.name(),
             });
         }
+        if !quantities.contains(&quantity) {
+            quantities.push(quantity);
+        }
     }
-
     Ok(quantities)
+}
+
+/// The error that is wanted of a quantity: its own, or the one of all others.
+fn wanted(quantity: &Quantity, wants: &[Want]) -> f64 {
+    let of = |quantity: Option<&Quantity>| {
+        let mut own = wants.iter().filter(|w| w.quantity.as_ref() == quantity);
+        own.next_back().map(|want| want.error)
+    };
+    of(Some(quantity))
+        .or_else(|| of(None))
+        .expect("a quantity is asked for, or suits those who ask for none")
 }
 
 /// Runs a study with `program`, which must be this command line; `interrupt` ends it between and within cases.
@@ -231,6 +264,7 @@ pub fn trade(
     let runner = Runner {
         program,
         scene: &params.scene,
+        probes: prepared.probes.clone(),
         interrupt,
     };
     let start = Instant::now();
@@ -240,12 +274,13 @@ pub fn trade(
         &files(),
     )?;
     let record_path = params.output.join("cases.jsonl");
-    let (reference, head, cases) = prepared.reference(&runner, params, &record_path, progress)?;
+    let (measured, head, cases) = prepared.reference(&runner, params, &record_path, progress)?;
     let Prepared {
         plain,
         base,
         knobs,
         common,
+        reference,
         ..
     } = prepared;
     let with = |keys: &[String]| -> Vec<String> { common.iter().chain(keys).cloned().collect() };
@@ -264,15 +299,16 @@ pub fn trade(
         plain,
         directory,
         base,
-        settings: knobs
-            .into_iter()
-            .enumerate()
+        settings: (knobs.into_iter().enumerate())
             .flat_map(|(k, knob)| knob.settings.into_iter().map(move |s| (k, s)))
             .collect(),
         common,
-        reference,
-        reference_keys: head.reference.clone(),
-        quantities: head.quantities.clone(),
+        reference: measured,
+        reference_keys: (reference.other.is_none()).then(|| reference.keys.clone()),
+        wanted: (head.quantities.iter())
+            .map(|quantity| wanted(quantity, &params.wants))
+            .collect(),
+        quantities: head.quantities,
         cases,
         skipped: Vec::new(),
         record,
@@ -280,13 +316,13 @@ pub fn trade(
         deadline: start + params.budget,
         patience: Duration::from_secs_f64(PATIENCE * head.cost.seconds + 10.0),
     };
-    let ended = study.all(progress)?;
+    let ended = study.all(reference.own_error.case(), progress)?;
     progress.finish();
     let left = study.combinations().len();
     Ok(Trade {
         scene: params.scene.clone(),
-        quantities: head.quantities,
-        reference: (head.reference, head.cost),
+        wants: study.quantities.into_iter().zip(study.wanted).collect(),
+        reference: reference.with(head.cost),
         cases: study.cases,
         by: params.cost,
         left,
@@ -302,6 +338,7 @@ fn files() -> Files {
             .map(str::to_owned)
             .into(),
         series: false,
+        others: Vec::new(),
     }
 }
 

@@ -46,17 +46,57 @@ pub enum Outcome {
     },
 }
 
+/// A quantity and the largest relative error that is wanted of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Want {
+    /// The quantity; none for those that suit the outputs.
+    pub quantity: Option<Quantity>,
+    /// The error.
+    pub error: f64,
+}
+
+impl Want {
+    /// From the command line: `displacement=1%`, `probe:tip.u=0.01`, or `1%` for the quantities that suit the outputs.
+    ///
+    /// # Errors
+    /// A message with the fault and the remedy.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let (quantity, error) = match text.rsplit_once('=') {
+            Some((quantity, error)) => (Some(Quantity::parse(quantity)?), error),
+            None => (None, text),
+        };
+        let (number, unit) = match error.strip_suffix('%') {
+            Some(number) => (number, 0.01),
+            None => (error, 1.0),
+        };
+        match number.trim().parse::<f64>() {
+            Ok(number) if number > 0.0 && number.is_finite() => Ok(Self {
+                quantity,
+                error: number * unit,
+            }),
+            _ => Err(format!(
+                "`{error}` is no error above zero; write {}=1% or 0.01",
+                quantity.map_or("displacement".to_owned(), |q| q.name())
+            )),
+        }
+    }
+}
+
 /// Reference against which errors are measured.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reference {
-    /// Full peridynamics where bonds break or the scene moves, else [`Reference::Finer`].
+    /// Full peridynamics where bonds break in time, elements alone where nothing breaks on the mesh of a file, else [`Reference::Finer`].
     Auto,
     /// Peridynamics everywhere.
     FullPd,
+    /// Elements alone: half as large, of the mesh of a file of second order.
+    Elements,
     /// The scene with half the horizon and spacing (half the spacing where the horizon is a length of the material).
     Finer,
     /// The scene with these keys set otherwise.
     Keys(Vec<String>),
+    /// Another scene, with the same outputs.
+    Scene(PathBuf),
 }
 
 /// Measure of the cost of a case in the front.
@@ -101,14 +141,12 @@ pub struct TradeParams {
     pub knobs: Vec<String>,
     /// Further knobs, see [`typed`](super::typed).
     pub vary: Vec<Knob>,
-    /// Quantities to compare; empty for those that suit the outputs. The error of a case is the largest of them.
-    pub quantities: Vec<Quantity>,
+    /// Quantities to compare, with the errors that are wanted of them.
+    pub wants: Vec<Want>,
     /// Reference of the comparison.
     pub reference: Reference,
     /// Measure of cost of the front.
     pub cost: CostBy,
-    /// Errors for which the cheapest case is wanted as a scene.
-    pub wanted: Vec<f64>,
     /// Time for all cases together.
     pub budget: Duration,
     /// Folder for tables, plot, scenes and records for resuming.
@@ -122,6 +160,8 @@ pub struct Case {
     pub settings: Vec<String>,
     /// The keys that they set.
     pub overrides: Vec<String>,
+    /// Its coupling.
+    pub coupling: String,
     /// A number for the bytes of the mesh file that it read, if it read one.
     pub mesh: Option<u64>,
     /// Its outcome.
@@ -131,13 +171,14 @@ pub struct Case {
 }
 
 impl Case {
-    /// Cost and error, if it ran. Errors below 1e-9 are round-off and count as that.
-    pub fn point(&self, by: CostBy) -> Option<(f64, f64)> {
+    /// Cost, and the largest of its errors over those that are wanted, if it ran. Errors below 1e-9 are round-off and count as that.
+    pub fn point(&self, by: CostBy, wanted: &[f64]) -> Option<(f64, f64)> {
         match &self.outcome {
-            Outcome::Ran { cost, errors } => Some((
-                by.of(cost),
-                errors.iter().copied().fold(ROUND_OFF, f64::max),
-            )),
+            Outcome::Ran { cost, errors } => {
+                let each = errors.iter().zip(wanted);
+                let ratio = each.map(|(error, wanted)| error.max(ROUND_OFF) / wanted);
+                Some((by.of(cost), ratio.fold(0.0, f64::max)))
+            }
             _ => None,
         }
     }
@@ -157,10 +198,10 @@ impl Case {
 pub struct Trade {
     /// The scene file.
     pub scene: PathBuf,
-    /// Quantities that were compared.
-    pub quantities: Vec<Quantity>,
-    /// The keys of the reference, and its cost.
-    pub reference: (Vec<String>, Cost),
+    /// Quantities that were compared, with the errors that are wanted of them.
+    pub wants: Vec<(Quantity, f64)>,
+    /// The reference.
+    pub reference: ReferenceRun,
     /// All cases in the order in which they ran.
     pub cases: Vec<Case>,
     /// Measure of cost of the front.
@@ -169,6 +210,40 @@ pub struct Trade {
     pub left: usize,
     /// Reason why no more were run.
     pub ended: TradeEnd,
+}
+
+/// The reference of a study.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReferenceRun {
+    /// The keys that it sets.
+    pub keys: Vec<String>,
+    /// In words, with the reason for it.
+    pub why: String,
+    /// Its cost.
+    pub cost: Cost,
+    /// Its own error.
+    pub own_error: OwnError,
+}
+
+/// How the error of a reference itself is known.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum OwnError {
+    /// From three spacings: those of this case, of the scene as it is, and of the reference, each half of that before.
+    Order(Vec<String>),
+    /// It is smaller than that of this case, whose elements are of first order.
+    Bound(Vec<String>),
+    /// Not at all.
+    Unknown,
+}
+
+impl OwnError {
+    /// The case that it takes.
+    pub(super) fn case(&self) -> &[String] {
+        match self {
+            Self::Order(labels) | Self::Bound(labels) => labels,
+            Self::Unknown => &[],
+        }
+    }
 }
 
 /// Reason for the end of a study.
@@ -208,7 +283,7 @@ pub enum TradeError {
     },
     /// A quantity that the outputs do not have.
     #[error(
-        "the outputs have no `{quantity}` to compare; add it to [output], or compare something else with --quantity"
+        "the outputs have no `{quantity}` to compare; add it to [output], or compare something else with --want"
     )]
     Quantity {
         /// Its name.

@@ -23,6 +23,8 @@ pub(super) struct Head {
     pub mesh: Option<u64>,
     pub overrides: Vec<String>,
     pub reference: Vec<String>,
+    /// The text of another scene that is the reference.
+    pub other: Option<String>,
     pub quantities: Vec<Quantity>,
     pub cost: Cost,
 }
@@ -59,7 +61,7 @@ pub(super) fn mesh(scene: &Source, folder: &Path, overrides: &[String]) -> Optio
 }
 
 /// Reads the outputs of the reference from its folder.
-pub(super) fn kept(folder: &Path) -> Result<Measured, TradeError> {
+pub(super) fn kept(folder: &Path, probes: &[String]) -> Result<Measured, TradeError> {
     let path = folder.join("summary.json");
     let file_error = |source| TradeError::File {
         path: path.clone(),
@@ -70,7 +72,7 @@ pub(super) fn kept(folder: &Path) -> Result<Measured, TradeError> {
         why: e.to_string(),
         text,
     })?;
-    Measured::read(folder, &summary).map_err(file_error)
+    Measured::read(folder, &summary, probes).map_err(file_error)
 }
 
 /// The record of a study, if there is one; a last line that was cut off is left out.

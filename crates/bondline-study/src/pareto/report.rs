@@ -1,11 +1,12 @@
 //! A study as a table, CSV, JSON, a plot, and scenes.
 
+use std::cmp::Ordering;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::{Outcome, front};
+use super::{Outcome, OwnError, front};
 use crate::line_plot::{LinePlot, Scale, Series, Stroke};
 use crate::pareto::parameters::{Case, CostBy, Trade, TradeEnd, TradeError, TradeParams};
 use bondline::observe::atomic_file::write_whole;
@@ -14,15 +15,19 @@ use bondline::observe::report::{aligned, number};
 use bondline::scene::Source;
 
 impl Trade {
+    fn point(&self, case: &Case) -> Option<(f64, f64)> {
+        let wanted: Vec<f64> = self.wants.iter().map(|want| want.1).collect();
+        case.point(self.by, &wanted)
+    }
+
     fn points(&self) -> Vec<(usize, (f64, f64))> {
-        self.cases
-            .iter()
-            .enumerate()
-            .filter_map(|(k, c)| Some((k, c.point(self.by)?)))
+        let cases = self.cases.iter().enumerate();
+        cases
+            .filter_map(|(k, c)| Some((k, self.point(c)?)))
             .collect()
     }
 
-    /// Cases that no other case beats in both cost and error, cheapest first.
+    /// Cases that no other case beats in both cost and error, cheapest first; the error is the largest one over what is wanted of it.
     pub fn front(&self) -> Vec<&Case> {
         let points = self.points();
         let plain: Vec<(f64, f64)> = points.iter().map(|p| p.1).collect();
@@ -32,18 +37,68 @@ impl Trade {
             .collect()
     }
 
-    /// The cheapest case with an error of at most `wanted`.
-    pub fn cheapest(&self, wanted: f64) -> Option<&Case> {
-        self.front()
-            .into_iter()
-            .find(|c| c.point(self.by).is_some_and(|p| p.1 <= wanted))
+    /// The cheapest case whose errors are all as small as wanted.
+    pub fn cheapest(&self) -> Option<&Case> {
+        let meets = |c: &&Case| self.point(c).is_some_and(|p| p.1 <= 1.0);
+        self.front().into_iter().find(meets)
+    }
+
+    /// Couplings of the cases that ran, in the order in which they ran.
+    fn couplings(&self) -> Vec<&str> {
+        let mut found: Vec<&str> = Vec::new();
+        for (k, _) in self.points() {
+            let own = self.cases[k].coupling.as_str();
+            if !found.contains(&own) {
+                found.push(own);
+            }
+        }
+        found
+    }
+
+    /// The best case of a coupling by a key, of those that `takes` accepts by cost and error.
+    fn best(
+        &self,
+        coupling: &str,
+        takes: impl Fn((f64, f64)) -> bool,
+        key: impl Fn((f64, f64)) -> f64,
+    ) -> Option<&Case> {
+        let points = self.points().into_iter();
+        let own = points.filter(|(k, p)| self.cases[*k].coupling == coupling && takes(*p));
+        let best = own.min_by(|a, b| key(a.1).total_cmp(&key(b.1)))?;
+        Some(&self.cases[best.0])
+    }
+
+    /// The cheapest case of each coupling with every error as wanted; of one that has none the most accurate case.
+    pub fn at_equal_error(&self) -> Vec<&Case> {
+        let couplings = self.couplings().into_iter();
+        let mut found: Vec<&Case> = couplings
+            .filter_map(|coupling| {
+                self.best(coupling, |p| p.1 <= 1.0, |p| p.0)
+                    .or_else(|| self.best(coupling, |_| true, |p| p.1))
+            })
+            .collect();
+        let key = |c: &&Case| self.point(c).map(|p| (p.1 > 1.0, p.0));
+        found.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(Ordering::Equal));
+        found
+    }
+
+    /// The most accurate case of each coupling that costs no more than the scene as it is.
+    pub fn at_equal_cost(&self) -> Vec<&Case> {
+        let most = self.unit();
+        let couplings = self.couplings().into_iter();
+        let mut found: Vec<&Case> = couplings
+            .filter_map(|coupling| self.best(coupling, |p| p.0 <= most, |p| p.1))
+            .collect();
+        let key = |c: &&Case| self.point(c).map(|p| p.1);
+        found.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(Ordering::Equal));
+        found
     }
 
     /// By which factor guesses of cost and error were off, as medians and as the largest of nine tenths; `None` if nothing was guessed.
     pub fn spread(&self) -> Option<Spread> {
         let mut off: [Vec<f64>; 2] = Default::default();
         for case in &self.cases {
-            if let (Some(guess), Some(point)) = (case.guessed, case.point(self.by)) {
+            if let (Some(guess), Some(point)) = (case.guessed, self.point(case)) {
                 off[0].push((guess.0 / point.0).ln().abs().exp());
                 off[1].push((guess.1 / point.1).ln().abs().exp());
             }
@@ -74,10 +129,8 @@ impl Trade {
                 files.push(path);
             }
         }
-        for &wanted in &params.wanted {
-            if let Some(case) = self.cheapest(wanted) {
-                files.push(self.scene(params, case, wanted)?);
-            }
+        if let Some(case) = self.cheapest() {
+            files.push(self.scene(params, case)?);
         }
         Ok(files)
     }
@@ -85,9 +138,9 @@ impl Trade {
     fn csv(&self, folder: &Path) -> Result<PathBuf, TradeError> {
         let path = folder.join("trade.csv");
         let errors: Vec<String> = self
-            .quantities
+            .wants
             .iter()
-            .map(|q| format!("error {}", q.name()))
+            .map(|(q, _)| format!("error {}", q.name()))
             .collect();
         let mut header = vec![
             "case",
@@ -131,19 +184,27 @@ impl Trade {
         struct Whole<'a> {
             scene: &'a Path,
             quantities: Vec<String>,
+            wanted: Vec<f64>,
             cost: &'a str,
-            reference: &'a (Vec<String>, super::Cost),
+            reference: &'a [String],
+            reference_errors: Vec<Option<f64>>,
             front: Vec<String>,
+            at_equal_error: Vec<String>,
+            at_equal_cost: Vec<String>,
             spread: Option<Spread>,
             left: usize,
             cases: &'a [Case],
         }
         let whole = Whole {
             scene: &self.scene,
-            quantities: self.quantities.iter().map(|q| q.name()).collect(),
+            quantities: self.wants.iter().map(|(q, _)| q.name()).collect(),
+            wanted: self.wants.iter().map(|(_, wanted)| *wanted).collect(),
             cost: self.by.name(),
-            reference: &self.reference,
-            front: self.front().iter().map(|c| c.name()).collect(),
+            reference: &self.reference.keys,
+            reference_errors: self.reference_errors(),
+            front: names(&self.front()),
+            at_equal_error: names(&self.at_equal_error()),
+            at_equal_cost: names(&self.at_equal_cost()),
             spread: self.spread(),
             left: self.left,
             cases: &self.cases,
@@ -158,7 +219,7 @@ impl Trade {
     fn unit(&self) -> f64 {
         self.cases
             .first()
-            .and_then(|c| c.point(self.by))
+            .and_then(|c| self.point(c))
             .map_or(1.0, |p| p.0)
     }
 
@@ -170,15 +231,15 @@ impl Trade {
         let (line, names) = self
             .front()
             .iter()
-            .filter_map(|c| Some((scaled(c.point(self.by)?), c.name())))
+            .filter_map(|c| Some((scaled(self.point(c)?), c.name())))
             .unzip();
-        let base = self.cases.first().and_then(|c| c.point(self.by));
+        let base = self.cases.first().and_then(|c| self.point(c));
         // where the scene lies means nothing to those who see the plot
         let name = self.scene.file_name().unwrap_or(self.scene.as_os_str());
         LinePlot {
             title: format!("{}: error against cost", name.display()),
             x_label: format!("{} over that of the scene as it is", self.by.name()),
-            y_label: "relative error".to_owned(),
+            y_label: "error over the wanted one".to_owned(),
             x_scale: Scale::Log,
             y_scale: Scale::Log,
             series: vec![
@@ -193,7 +254,8 @@ impl Trade {
         }
     }
 
-    fn scene(&self, params: &TradeParams, case: &Case, wanted: f64) -> Result<PathBuf, TradeError> {
+    /// Writes the scene with the settings of a case, ready to run.
+    fn scene(&self, params: &TradeParams, case: &Case) -> Result<PathBuf, TradeError> {
         let file_error = |path: &Path, source| TradeError::File {
             path: path.to_path_buf(),
             source,
@@ -212,16 +274,17 @@ impl Trade {
         let folder = std::fs::canonicalize(folder).map_err(|e| file_error(folder, e))?;
         let merged = source.text(&folder).map_err(scene_error)?;
         let stem = params.scene.file_stem().map(|s| s.to_string_lossy());
-        let name = format!("{}-{wanted}.toml", stem.unwrap_or("scene".into()));
+        let name = format!("{}-chosen.toml", stem.unwrap_or("scene".into()));
         let path = params.output.join(name);
-        let (_, error) = case.point(self.by).unwrap_or((f64::NAN, f64::NAN));
         write_whole(&path, |out| {
             use std::io::Write as _;
             writeln!(
                 out,
-                "# {}: the cheapest case found ({}) with an error of at most {wanted}; measured: {error:.3e}.\n",
+                "# {}: the cheapest case found ({}) with {}; measured: {}.\n",
                 case.name(),
                 self.by.name(),
+                self.wanted_text(),
+                self.errors_of(case).join(", "),
             )?;
             out.write_all(merged.as_bytes())
         })?;
@@ -249,45 +312,152 @@ fn cost_text(by: CostBy, value: f64) -> String {
     }
 }
 
-impl fmt::Display for Trade {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let names: Vec<String> = self.quantities.iter().map(|q| q.name()).collect();
-        writeln!(
-            f,
-            "{}: error of {} against {}, {} of {}\n",
-            self.scene.display(),
-            names.join(", "),
-            self.by.name(),
-            self.front().len(),
-            self.points().len()
-        )?;
+/// Part of a wanted error up to which that of the reference is small.
+const SMALL: f64 = 0.34;
+
+/// Refused cases that are listed, and characters of their reasons.
+const LISTED: (usize, usize) = (12, 200);
+
+fn names(cases: &[&Case]) -> Vec<String> {
+    cases.iter().map(|c| c.name()).collect()
+}
+
+fn percent(error: f64) -> String {
+    format!("{} %", number(100.0 * error))
+}
+
+impl Trade {
+    /// The quantities with the errors that are wanted, for a sentence.
+    fn wanted_text(&self) -> String {
+        let each = self.wants.iter();
+        let each = each.map(|(q, wanted)| format!("{} to {}", q.name(), percent(*wanted)));
+        each.collect::<Vec<_>>().join(", ")
+    }
+
+    fn errors_of(&self, case: &Case) -> Vec<String> {
+        match &case.outcome {
+            Outcome::Ran { errors, .. } => errors.iter().map(|e| percent(*e)).collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// A table of cases: coupling, cost, memory, errors and settings.
+    fn table(&self, cases: &[&Case]) -> String {
         let unit = self.unit();
-        let mut grid = vec![
-            ["cost", "over the scene's", "error", "case"]
-                .map(str::to_owned)
-                .to_vec(),
-        ];
-        let base = self.cases.first();
-        let shown = self.front();
-        let not_shown = base.filter(|b| !shown.contains(b));
-        for case in shown.iter().copied().chain(not_shown) {
-            if let Some((cost, error)) = case.point(self.by) {
-                grid.push(vec![
-                    cost_text(self.by, cost),
-                    format!("{:.3}", cost / unit),
-                    number(error),
-                    case.name(),
-                ]);
+        let mut header = vec!["coupling", self.by.name(), "over the scene's", "memory"];
+        let quantities: Vec<String> = self.wants.iter().map(|(q, _)| q.name()).collect();
+        header.extend(quantities.iter().map(String::as_str));
+        header.push("case");
+        let mut grid: Vec<Vec<String>> = vec![header.into_iter().map(str::to_owned).collect()];
+        for case in cases {
+            let (Some((cost, error)), Outcome::Ran { cost: all, .. }) =
+                (self.point(case), &case.outcome)
+            else {
+                continue;
+            };
+            let mut row = vec![
+                case.coupling.clone(),
+                cost_text(self.by, cost),
+                format!("{:.3}", cost / unit),
+                cost_text(CostBy::Memory, all.memory),
+            ];
+            row.extend(self.errors_of(case));
+            row.push(match error > 1.0 {
+                true => format!("{} (no case is as accurate as wanted)", case.name()),
+                false => case.name(),
+            });
+            grid.push(row);
+        }
+        aligned(&grid)
+    }
+
+    fn told_of_reference(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let reference = &self.reference;
+        let cost = cost_text(self.by, self.by.of(&reference.cost));
+        write!(f, "reference: {} ({cost})", reference.why)?;
+        if !reference.keys.is_empty() {
+            write!(f, ": {}", reference.keys.join(", "))?;
+        }
+        writeln!(f)?;
+        for ((quantity, wanted), own) in self.wants.iter().zip(self.reference_errors()) {
+            let name = quantity.name();
+            let how = match &reference.own_error {
+                OwnError::Bound(_) => "at most",
+                _ => "about",
+            };
+            match own {
+                Some(own) if own <= SMALL * wanted => {
+                    writeln!(f, "its own error of {name}: {how} {}", percent(own))?;
+                }
+                Some(own) => writeln!(
+                    f,
+                    "its own error of {name}: {how} {}, so that errors near this are not known; --reference names another",
+                    percent(own)
+                )?,
+                None => writeln!(f, "its own error of {name} is not known")?,
             }
         }
-        writeln!(f, "{}", aligned(&grid))?;
-        let (keys, cost) = &self.reference;
+        Ok(())
+    }
+
+    /// Says which cases did not run, once for each reason.
+    fn told_of_refusals(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut reasons: Vec<(String, Vec<String>)> = Vec::new();
+        for case in &self.cases {
+            let why = match &case.outcome {
+                Outcome::Refused { why } => why.chars().take(LISTED.1).collect(),
+                Outcome::OverTime { .. } => "ended after several times the reference".to_owned(),
+                Outcome::Ran { .. } => continue,
+            };
+            match reasons.iter_mut().find(|(known, _)| *known == why) {
+                Some((_, cases)) => cases.push(case.name()),
+                None => reasons.push((why, vec![case.name()])),
+            }
+        }
+        for (why, cases) in reasons.iter().take(LISTED.0) {
+            writeln!(f, "did not run: {}: {why}", cases.join("; "))?;
+        }
+        match reasons.len().saturating_sub(LISTED.0) {
+            0 => Ok(()),
+            more => writeln!(f, "did not run: {more} more, see trade.json"),
+        }
+    }
+}
+
+impl fmt::Display for Trade {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "reference: {} ({})",
-            keys.join(", "),
-            cost_text(self.by, self.by.of(cost))
+            "{}: {}; {} cases\n",
+            self.scene.display(),
+            self.wanted_text(),
+            self.points().len()
         )?;
+        self.told_of_reference(f)?;
+        writeln!(
+            f,
+            "\nat equal error, the cheapest case of each coupling:\n{}",
+            self.table(&self.at_equal_error())
+        )?;
+        writeln!(
+            f,
+            "at equal {}, {} as of the scene, the most accurate case of each coupling:\n{}",
+            self.by.name(),
+            cost_text(self.by, self.unit()),
+            self.table(&self.at_equal_cost())
+        )?;
+        let base = self.cases.first();
+        let mut shown = self.front();
+        shown.extend(base.filter(|b| !shown.contains(b)));
+        writeln!(
+            f,
+            "no case beats these in cost and error; and the scene:\n{}",
+            self.table(&shown)
+        )?;
+        match self.cheapest() {
+            Some(case) => writeln!(f, "chosen: {}", case.name())?,
+            None => writeln!(f, "no case is as accurate as wanted")?,
+        }
         if let Some(s) = self.spread() {
             writeln!(
                 f,
@@ -295,22 +465,7 @@ impl fmt::Display for Trade {
                 s.guesses, s.cost.0, s.error.0, s.cost.1, s.error.1
             )?;
         }
-        let mut refused = self.cases.iter().filter_map(|c| match &c.outcome {
-            Outcome::Refused { why } => Some((c, why.clone())),
-            Outcome::OverTime { seconds } => Some((
-                c,
-                format!("ended after {seconds:.0} s, several times the reference"),
-            )),
-            Outcome::Ran { .. } => None,
-        });
-        for (case, why) in refused.by_ref().take(20) {
-            let short: String = why.chars().take(160).collect();
-            writeln!(f, "did not run: {}: {short}", case.name())?;
-        }
-        let more = refused.count();
-        if more > 0 {
-            writeln!(f, "did not run: {more} more, see trade.json")?;
-        }
+        self.told_of_refusals(f)?;
         match self.ended {
             TradeEnd::Complete => Ok(()),
             TradeEnd::Budget => writeln!(

@@ -1,5 +1,6 @@
 //! Order of the cases of a study: each setting alone, then the combination that promises most.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -9,8 +10,7 @@ use super::record::{self, write_line};
 use super::surrogate::{Effects, most_promising};
 use super::trial::{Attempt, Ran, Runner};
 use crate::pareto::parameters::{Case, TradeEnd, TradeError, TradeParams};
-use crate::variants::{Base, Setting};
-use crate::variants::{Measured, Quantity};
+use crate::variants::{Base, Change, Measured, Quantity, Setting};
 use bondline::progress::Progress;
 use bondline::scene::Source;
 
@@ -28,8 +28,11 @@ pub(super) struct Study<'a> {
     pub settings: Vec<(usize, Setting)>,
     pub common: Vec<String>,
     pub reference: Measured,
-    pub reference_keys: Vec<String>,
+    /// Keys of the reference, where it is the scene with these.
+    pub reference_keys: Option<Vec<String>>,
     pub quantities: Vec<Quantity>,
+    /// The error that is wanted of each.
+    pub wanted: Vec<f64>,
     pub cases: Vec<Case>,
     /// Combinations that are the reference itself.
     pub skipped: Vec<Vec<String>>,
@@ -40,12 +43,19 @@ pub(super) struct Study<'a> {
     pub patience: Duration,
 }
 
+/// Factor by which guesses of errors may go astray.
+const ASTRAY: f64 = 2.0;
+
 /// Combinations beyond this are not looked at.
 const MOST_COMBINATIONS: usize = 20_000;
 
 impl Study<'_> {
-    /// Runs everything and returns the reason for its end.
-    pub(super) fn all(&mut self, progress: &dyn Progress) -> Result<TradeEnd, TradeError> {
+    /// Runs everything, `first` of all combinations, and returns the reason for its end.
+    pub(super) fn all(
+        &mut self,
+        first: &[String],
+        progress: &dyn Progress,
+    ) -> Result<TradeEnd, TradeError> {
         let singles = 1 + self.settings.len();
         progress.stage("the scene, and each setting alone", Some(singles as u64));
         if let Some(end) = self.case(&[], None, progress)? {
@@ -72,10 +82,18 @@ impl Study<'_> {
         }
         progress.advance(1);
         for k in 0..self.settings.len() {
-            if let Some(end) = self.case(&[k], None, progress)? {
+            if self.acts(&[k])
+                && let Some(end) = self.case(&[k], None, progress)?
+            {
                 return Ok(end);
             }
             progress.advance(1);
+        }
+        let positions = first.iter().map(|label| self.position(label));
+        if let Some(chosen) = positions.collect::<Option<Vec<usize>>>()
+            && let Some(end) = self.case(&chosen, None, progress)?
+        {
+            return Ok(end);
         }
         progress.stage("combinations", None);
         while let Some((chosen, guess)) = self.next() {
@@ -94,10 +112,34 @@ impl Study<'_> {
     }
 
     fn chosen(&self, case: &Case) -> Option<Vec<usize>> {
-        case.settings
-            .iter()
-            .map(|label| self.settings.iter().position(|s| s.1.label == *label))
-            .collect()
+        let labels = case.settings.iter();
+        labels.map(|label| self.position(label)).collect()
+    }
+
+    fn position(&self, label: &str) -> Option<usize> {
+        self.settings.iter().position(|s| s.1.label == *label)
+    }
+
+    /// The coupling of a case.
+    fn coupling(&self, chosen: &[usize]) -> &str {
+        let mut changes = chosen.iter().map(|&k| &self.settings[k].1.change);
+        changes
+            .find_map(|change| match change {
+                Change::Coupling(name) => Some(name.as_str()),
+                _ => None,
+            })
+            .unwrap_or_else(|| self.base.coupling())
+    }
+
+    /// Returns true if each setting changes something beside the others.
+    fn acts(&self, chosen: &[usize]) -> bool {
+        let coupling = self.coupling(chosen);
+        let mut changes = chosen.iter().map(|&k| &self.settings[k].1.change);
+        changes.all(|change| self.base.acts(change, coupling))
+    }
+
+    fn point(&self, case: &Case) -> Option<(f64, f64)> {
+        case.point(self.params.cost, &self.wanted)
     }
 
     /// Runs a case unless its outcome is known; why the study has to end, if it has.
@@ -112,7 +154,7 @@ impl Study<'_> {
             .base
             .overrides(chosen.iter().map(|&k| &self.settings[k].1.change));
         // the reference agrees with itself
-        if overrides == self.reference_keys {
+        if self.reference_keys.as_ref() == Some(&overrides) {
             self.skipped.push(settings);
             return Ok(None);
         }
@@ -156,6 +198,7 @@ impl Study<'_> {
         // what a case writes is of no further use
         let _ = std::fs::remove_dir_all(&folder);
         let case = Case {
+            coupling: self.coupling(chosen).to_owned(),
             settings,
             overrides,
             mesh,
@@ -206,6 +249,7 @@ impl Study<'_> {
                 .iter()
                 .filter(|c| c.iter().all(|&o| self.settings[o].0 != knob))
                 .map(|c| c.iter().copied().chain([k]).collect())
+                .filter(|c: &Vec<usize>| self.acts(c))
                 .take(MOST_COMBINATIONS.saturating_sub(all.len()))
                 .collect();
             all.extend(with);
@@ -224,7 +268,7 @@ impl Study<'_> {
         let ran: Vec<(Vec<usize>, (f64, f64))> = self
             .cases
             .iter()
-            .filter_map(|c| Some((self.chosen(c)?, c.point(self.params.cost)?)))
+            .filter_map(|c| Some((self.chosen(c)?, self.point(c)?)))
             .collect();
         let number = self.settings.len();
         let of = |f: fn(&(f64, f64)) -> f64| {
@@ -238,18 +282,48 @@ impl Study<'_> {
             .map(|c| (cost.guess(c), error.guess(c)))
             .collect();
         let measured: Vec<(f64, f64)> = ran.iter().map(|r| r.1).collect();
-        let wanted = self.params.wanted.iter().find_map(|&w| {
-            // the cheapest that should meet a wanted error, if it is cheaper than what does
-            let met = measured
-                .iter()
-                .filter(|p| p.1 <= w)
-                .map(|p| p.0)
-                .fold(f64::INFINITY, f64::min);
-            (0..guessed.len())
-                .filter(|&k| guessed[k].1 <= w && WORTH * guessed[k].0 < met)
-                .min_by(|&a, &b| guessed[a].0.total_cmp(&guessed[b].0))
-        });
-        let k = wanted.or_else(|| most_promising(&guessed, &measured, WORTH))?;
+        let k = self
+            .cheapest_of_couplings(&candidates, &guessed)
+            .or_else(|| most_promising(&guessed, &measured, WORTH))?;
         Some((candidates[k].clone(), guessed[k]))
+    }
+
+    /// Of all couplings the candidate that may be the cheapest of its coupling with the errors wanted: first of those that have none yet.
+    fn cheapest_of_couplings(
+        &self,
+        candidates: &[Vec<usize>],
+        guessed: &[(f64, f64)],
+    ) -> Option<usize> {
+        let couplings: BTreeSet<&str> = candidates.iter().map(|c| self.coupling(c)).collect();
+        let best = couplings.into_iter().filter_map(|coupling| {
+            let is_its = |case: &&Case| case.coupling == coupling;
+            let own = self.cases.iter().filter(is_its);
+            let own: Vec<(f64, f64)> = own.filter_map(|case| self.point(case)).collect();
+            let least =
+                |values: &mut dyn Iterator<Item = f64>| values.fold(f64::INFINITY, f64::min);
+            let met = least(&mut own.iter().filter(|p| p.1 <= 1.0).map(|p| p.0));
+            let its = (0..candidates.len()).filter(|&k| self.coupling(&candidates[k]) == coupling);
+            let its: Vec<usize> = its.collect();
+            let meeting = its.iter().copied();
+            let meeting = meeting.filter(|&k| guessed[k].1 <= 1.0 && WORTH * guessed[k].0 < met);
+            let cheapest = meeting.min_by(|&a, &b| guessed[a].0.total_cmp(&guessed[b].0));
+            // none is guessed to meet them: the most accurate one, as far as guesses go astray
+            let nearest = || {
+                let most = ASTRAY.min(least(&mut own.iter().map(|p| p.1)) / WORTH);
+                let near = its.iter().copied().filter(|&k| guessed[k].1 <= most);
+                near.min_by(|&a, &b| guessed[a].1.total_cmp(&guessed[b].1))
+            };
+            let found = match met.is_finite() {
+                true => cheapest,
+                false => cheapest.or_else(nearest),
+            };
+            // those that meet them already by what they would save
+            let before = if met.is_finite() { met } else { 1.0 };
+            found.map(|k| (met.is_finite(), guessed[k].0 / before, k))
+        });
+        let order = |a: &(bool, f64, usize), b: &(bool, f64, usize)| {
+            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2))
+        };
+        best.min_by(order).map(|found| found.2)
     }
 }

@@ -34,11 +34,13 @@ pub(super) struct Runner<'a> {
     /// This program.
     pub program: &'a Path,
     pub scene: &'a Path,
+    /// Names of the scene's probes, in the order of their rows.
+    pub probes: Vec<String>,
     pub interrupt: Option<&'a AtomicBool>,
 }
 
 /// Cost and outputs of a run that has ended, from its folder and its summary.
-fn read_outcome(folder: &Path, summary: &Path) -> Result<Attempt, TradeError> {
+fn read_outcome(folder: &Path, summary: &Path, probes: &[String]) -> Result<Attempt, TradeError> {
     let file_error = |source| TradeError::File {
         path: folder.to_path_buf(),
         source,
@@ -62,7 +64,7 @@ fn read_outcome(folder: &Path, summary: &Path) -> Result<Attempt, TradeError> {
         bond_visits: number(&summary["sizes"]["bonds"]) * steps,
         unknowns: number(&summary["sizes"]["dofs"]),
     };
-    let measured = Measured::read(folder, &summary).map_err(file_error)?;
+    let measured = Measured::read(folder, &summary, probes).map_err(file_error)?;
     Ok(Attempt::Ran(Ran { cost, measured }))
 }
 
@@ -160,7 +162,7 @@ impl Runner<'_> {
                 one_line(&text)
             }));
         }
-        read_outcome(folder, &summary)
+        read_outcome(folder, &summary, &self.probes)
     }
 }
 

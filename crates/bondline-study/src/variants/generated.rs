@@ -65,3 +65,22 @@ pub(super) fn generated(spec: &SceneSpec) -> Option<Generated> {
         MeshSpec::File(_) => return None,
     })
 }
+
+/// Corners of the cut-outs of a generated mesh.
+pub(crate) fn cutouts(spec: &SceneSpec) -> Vec<(Vec<f64>, Vec<f64>)> {
+    let cutouts = match &spec.mesh {
+        Some(MeshSpec::Line(m)) => &m.cutouts,
+        Some(MeshSpec::Rectangle(m)) => &m.cutouts,
+        Some(MeshSpec::Box(m)) => &m.cutouts,
+        Some(MeshSpec::File(_)) | None => return Vec::new(),
+    };
+    let corners = cutouts.values();
+    corners
+        .map(|c| (c.min.values.clone(), c.max.values.clone()))
+        .collect()
+}
+
+/// Corners of a generated mesh.
+pub(crate) fn corners(spec: &SceneSpec) -> Option<(Vec<f64>, Vec<f64>)> {
+    generated(spec).map(|m| (m.min, m.max))
+}

@@ -17,8 +17,16 @@ pub enum Quantity {
     Reaction,
     /// Stored energy.
     Energy,
+    /// Columns at a probe: `probe.NAME.COLUMN`, where `u` stands for all components of the displacement. At rest the difference over the value of the reference, in time and load steps as of a history.
+    Probe(String, String),
+    /// Columns along a line of a scene at rest: `line.NAME.COLUMN`; root mean square of the difference over that of the reference.
+    Line(String, String),
     /// A column of the history: root mean square over time of the difference, over that of the reference.
     History(String),
+    /// The largest absolute value of a column of the history, as a peak load.
+    Peak(String),
+    /// Area of cracks at the end, in the plane their length.
+    CrackLength,
     /// Path of a tip: the largest distance of a point of the reference's path from that of the run, over the length of the former.
     Path(String),
     /// Time of a tip: root mean square, over the points of the reference's path, of the difference in arrival at the same length, over
@@ -26,25 +34,41 @@ pub enum Quantity {
     TipTime(String),
 }
 
+/// Quantities as they are typed.
+const NAMES: &str = "displacement, strain, reaction, energy, probe.NAME.COLUMN, line.NAME.COLUMN, history.COLUMN, peak.COLUMN, crack-length, path.TIP, tip-time.TIP";
+
 impl Quantity {
-    /// From the command line: `displacement`, `strain`, `reaction`, `energy`, `history.COLUMN`, `path.TIP`, `tip-time.TIP`.
+    /// From the command line: `displacement`, `strain`, `reaction`, `energy`, `probe.NAME.COLUMN`, `line.NAME.COLUMN`, `history.COLUMN`, `peak.COLUMN`, `crack-length`, `path.TIP`, `tip-time.TIP`; the first dot may be a colon.
     ///
     /// # Errors
     /// A message with the known quantities.
     pub fn parse(text: &str) -> Result<Self, String> {
-        Ok(match text.split_once('.') {
-            None if text == "displacement" => Self::Displacement,
-            None if text == "strain" => Self::Strain,
-            None if text == "reaction" => Self::Reaction,
-            None if text == "energy" => Self::Energy,
-            Some(("history", column)) => Self::History(column.to_owned()),
-            Some(("path", tip)) => Self::Path(tip.to_owned()),
-            Some(("tip-time", tip)) => Self::TipTime(tip.to_owned()),
-            _ => {
-                return Err(format!(
-                    "`{text}` is no quantity; known: displacement, strain, reaction, energy, history.COLUMN, path.TIP, tip-time.TIP"
-                ));
-            }
+        let unknown = || format!("`{text}` is no quantity; known: {NAMES}");
+        let Some((kind, name)) = text.split_once(['.', ':']) else {
+            return Ok(match text {
+                "displacement" => Self::Displacement,
+                "strain" => Self::Strain,
+                "reaction" => Self::Reaction,
+                "energy" => Self::Energy,
+                "crack-length" => Self::CrackLength,
+                _ => return Err(unknown()),
+            });
+        };
+        let name = name.to_owned();
+        let column = || {
+            let (place, column) = name.rsplit_once('.').ok_or_else(|| {
+                format!("`{text}` names no column; write {kind}.NAME.COLUMN, as {kind}.{name}.u")
+            })?;
+            Ok::<_, String>((place.to_owned(), column.to_owned()))
+        };
+        Ok(match kind {
+            "probe" => column().map(|(place, column)| Self::Probe(place, column))?,
+            "line" => column().map(|(place, column)| Self::Line(place, column))?,
+            "history" => Self::History(name),
+            "peak" => Self::Peak(name),
+            "path" => Self::Path(name),
+            "tip-time" => Self::TipTime(name),
+            _ => return Err(unknown()),
         })
     }
 
@@ -55,7 +79,11 @@ impl Quantity {
             Self::Strain => "strain".to_owned(),
             Self::Reaction => "reaction".to_owned(),
             Self::Energy => "energy".to_owned(),
+            Self::Probe(place, column) => format!("probe.{place}.{column}"),
+            Self::Line(place, column) => format!("line.{place}.{column}"),
             Self::History(c) => format!("history.{c}"),
+            Self::Peak(c) => format!("peak.{c}"),
+            Self::CrackLength => "crack-length".to_owned(),
             Self::Path(t) => format!("path.{t}"),
             Self::TipTime(t) => format!("tip-time.{t}"),
         }
@@ -107,8 +135,10 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// Everything of a run that can be compared.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measured {
-    /// Tables along lines and at probes of a scene at rest.
-    samples: Vec<Columns>,
+    /// Tables along lines, and that of all probes, of a scene at rest, by the ends of their files' names.
+    samples: BTreeMap<String, Columns>,
+    /// Names of the probes, in the order of their rows.
+    probes: Vec<String>,
     history: Option<Columns>,
     tips: BTreeMap<String, Columns>,
     reactions: BTreeMap<String, Vec<f64>>,
@@ -116,12 +146,18 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Reads the outputs of a run from its folder, and its summary.
-    pub(crate) fn read(folder: &Path, summary: &serde_json::Value) -> std::io::Result<Self> {
+    /// Reads the outputs of a run from its folder, and its summary; `probes` are the names of its probes in the order of their rows.
+    pub(crate) fn read(
+        folder: &Path,
+        summary: &serde_json::Value,
+        probes: &[String],
+    ) -> std::io::Result<Self> {
         let mut found = Self {
             energy: summary["energy"].as_f64(),
+            probes: probes.to_vec(),
             ..Self::default()
         };
+        let scene = summary["scene"].as_str().unwrap_or_default();
         for reaction in summary["reactions"].as_array().into_iter().flatten() {
             let force = reaction["force"].as_array().into_iter().flatten();
             found.reactions.insert(
@@ -146,7 +182,9 @@ impl Measured {
             } else if stem.ends_with("_history") {
                 found.history = Some(table);
             } else {
-                found.samples.push(table);
+                let own = stem.strip_prefix(scene).unwrap_or(&stem);
+                let own = own.trim_start_matches('_').to_owned();
+                found.samples.insert(own, table);
             }
         }
         Ok(found)
@@ -181,12 +219,13 @@ impl Measured {
     /// Relative difference from a reference; `None` where one of the two does not have the quantity.
     pub(crate) fn error(&self, reference: &Self, quantity: &Quantity) -> Option<f64> {
         let error = match quantity {
-            Quantity::Displacement => {
-                sampled(&self.samples, &reference.samples, |n| is_component(n, 'u'))
+            Quantity::Displacement => sampled(&self.beside(reference)?, |n| is_component(n, 'u')),
+            Quantity::Strain => sampled(&self.beside(reference)?, |n| is_component(n, 'e')),
+            Quantity::Line(line, column) => {
+                let pair = (self.samples.get(line)?, reference.samples.get(line)?);
+                sampled(&[pair], |n| is_of(n, column))
             }
-            Quantity::Strain => {
-                sampled(&self.samples, &reference.samples, |n| is_component(n, 'e'))
-            }
+            Quantity::Probe(probe, column) => self.at_probe(reference, probe, column),
             Quantity::Reaction => {
                 let (mut most, mut scale) = (0.0f64, 0.0f64);
                 for (name, force) in &reference.reactions {
@@ -203,11 +242,69 @@ impl Measured {
                 let reference = reference.history.as_ref()?.pairs("time", column)?;
                 over_time(&own, &reference)
             }
+            Quantity::Peak(column) => {
+                let peak = |measured: &Self| {
+                    let pairs = measured.history.as_ref()?.pairs("time", column)?;
+                    Some(pairs.iter().map(|p| p.1.abs()).fold(0.0, f64::max))
+                };
+                Some((peak(self)? / peak(reference)? - 1.0).abs())
+            }
+            Quantity::CrackLength => {
+                let end = |measured: &Self| {
+                    let pairs = measured.history.as_ref()?.pairs("time", CRACK_AREA)?;
+                    Some(pairs.last()?.1)
+                };
+                Some((end(self)? / end(reference)? - 1.0).abs())
+            }
             Quantity::Path(tip) => path_error(self.tips.get(tip)?, reference.tips.get(tip)?),
             Quantity::TipTime(tip) => time_error(self.tips.get(tip)?, reference.tips.get(tip)?),
         };
         error.filter(|e| e.is_finite())
     }
+
+    /// All tables of samples, each beside that of a reference.
+    fn beside<'a>(&'a self, reference: &'a Self) -> Option<Vec<(&'a Columns, &'a Columns)>> {
+        let tables = reference.samples.iter();
+        tables
+            .map(|(name, table)| Some((self.samples.get(name)?, table)))
+            .collect()
+    }
+
+    /// The difference from a reference at a probe.
+    fn at_probe(&self, reference: &Self, probe: &str, column: &str) -> Option<f64> {
+        if let Some(history) = &reference.history {
+            let prefix = format!("{probe}_");
+            let is_its = |n: &str| n.strip_prefix(&prefix).is_some_and(|n| is_of(n, column));
+            let names = history.names.iter().filter(|n| is_its(n));
+            let (mut difference, mut size) = (0.0, 0.0);
+            for name in names {
+                let own = self.history.as_ref()?.pairs("time", name)?;
+                let (d, s) = squares_over_time(&own, &history.pairs("time", name)?)?;
+                (difference, size) = (difference + d, size + s);
+            }
+            return Some((difference / size).sqrt());
+        }
+        let row = |measured: &Self| -> Option<Columns> {
+            let number = measured.probes.iter().position(|name| name == probe)?;
+            let table = measured.samples.get(PROBES)?;
+            Some(Columns {
+                names: table.names.clone(),
+                rows: vec![table.rows.get(number)?.clone()],
+            })
+        };
+        sampled(&[(&row(self)?, &row(reference)?)], |n| is_of(n, column))
+    }
+}
+
+/// The table of all probes of a scene at rest.
+const PROBES: &str = "probes";
+
+/// Column of a history with the area of cracks.
+const CRACK_AREA: &str = "crack_area";
+
+/// Returns true if a column is one of those that are asked for: `u` stands for all components of the displacement.
+fn is_of(name: &str, wanted: &str) -> bool {
+    name == wanted || wanted == "u" && is_component(name, 'u')
 }
 
 fn norm(v: &[f64]) -> f64 {
@@ -228,12 +325,9 @@ fn still(table: &Columns, name: &str) -> bool {
 }
 
 /// Root mean square of the difference at common positions over that of the reference.
-fn sampled(own: &[Columns], reference: &[Columns], wanted: impl Fn(&str) -> bool) -> Option<f64> {
-    if own.len() != reference.len() {
-        return None;
-    }
+fn sampled(tables: &[(&Columns, &Columns)], wanted: impl Fn(&str) -> bool) -> Option<f64> {
     let (mut difference, mut size, mut common) = (0.0, 0.0, 0usize);
-    for (own, reference) in own.iter().zip(reference) {
+    for (own, reference) in tables {
         let position = reference.columns(|n| AXES.contains(&n));
         let values = reference.columns(&wanted);
         let key =
@@ -266,12 +360,18 @@ fn at(series: &[(f64, f64)], x: f64) -> Option<f64> {
 }
 
 fn over_time(own: &[(f64, f64)], reference: &[(f64, f64)]) -> Option<f64> {
+    let (difference, size) = squares_over_time(own, reference)?;
+    Some((difference / size).sqrt())
+}
+
+/// Sums over the times of the reference of the squared difference, and of its squared values.
+fn squares_over_time(own: &[(f64, f64)], reference: &[(f64, f64)]) -> Option<(f64, f64)> {
     let (mut difference, mut size) = (0.0, 0.0);
     for &(time, value) in reference {
         difference += (at(own, time)? - value).powi(2);
         size += value * value;
     }
-    Some((difference / size).sqrt())
+    Some((difference, size))
 }
 
 /// Positions of a tip, and its times.
@@ -394,16 +494,51 @@ mod tests {
                 .map(|k| format!("{k},0,{},{},1,2,3,0", f * k as f64, f))
                 .collect();
             Measured {
-                samples: vec![Columns::parse(&format!(
-                    "x,y,ux,uy,exx,exy,eyy,model\n{}",
-                    rows.join("\n")
-                ))],
+                samples: BTreeMap::from([(
+                    "middle".to_owned(),
+                    Columns::parse(&format!("x,y,ux,uy,exx,exy,eyy,model\n{}", rows.join("\n"))),
+                )]),
                 ..Measured::default()
             }
         };
         let e = |q| table(1.1, 2).error(&table(1.0, 9), &q).unwrap();
         assert!((e(Quantity::Displacement) - 0.1).abs() < 1e-12);
         assert_eq!(e(Quantity::Strain), 0.0);
+    }
+
+    #[test]
+    fn a_probe_and_a_line_are_found_by_their_names() {
+        let rest = |f: f64| Measured {
+            samples: BTreeMap::from([
+                (
+                    "probes".to_owned(),
+                    Columns::parse(&format!("x,ux,sxx\n0,3,1\n1,{},{}", 4.0 * f, 2.0 * f)),
+                ),
+                (
+                    "cut".to_owned(),
+                    Columns::parse(&format!("x,ux,sxx\n0,1,1\n2,1,{f}")),
+                ),
+            ]),
+            probes: vec!["left".to_owned(), "tip".to_owned()],
+            ..Measured::default()
+        };
+        let e = |q: &str| rest(1.1).error(&rest(1.0), &Quantity::parse(q).unwrap());
+        assert!((e("probe:tip.u").unwrap() - 0.1).abs() < 1e-12);
+        assert!((e("probe.tip.sxx").unwrap() - 0.1).abs() < 1e-12);
+        assert_eq!(e("probe.left.u"), Some(0.0));
+        assert!((e("line.cut.sxx").unwrap() - 0.1 / 2f64.sqrt()).abs() < 1e-12);
+        assert_eq!(e("line.cut.u"), Some(0.0));
+        for missing in ["probe.right.u", "probe.tip.syy", "line.tip.u"] {
+            assert_eq!(e(missing), None, "{missing}");
+        }
+        // in time
+        let (reference, own) = (history(|t| 2.0 * t, 10), history(|t| 1.8 * t, 10));
+        let at_end = |q: &str| own.error(&reference, &Quantity::parse(q).unwrap()).unwrap();
+        assert!((at_end("probe.end.u") - 0.1).abs() < 1e-12);
+        assert!((at_end("peak.end_ux") - 0.1).abs() < 1e-12);
+        for wrong in ["probe.tip", "colour", "rod.tip.u"] {
+            assert!(Quantity::parse(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

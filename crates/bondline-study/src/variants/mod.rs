@@ -13,8 +13,9 @@ mod parameters;
 pub use measure::{Quantity, distance_from_path};
 pub use parameters::{KNOBS, Knob, Setting, typed};
 
+pub(crate) use generated::{corners, cutouts};
 pub(crate) use measure::Measured;
-pub(crate) use parameters::{Base, coordinates, corners, cutouts};
+pub(crate) use parameters::{Base, Change, coordinates};
 
 use bondline::scene::SceneSpec;
 use bondline::scene::spec::SolveSpec;
@@ -22,15 +23,15 @@ use bondline::scene::spec::SolveSpec;
 /// Keys that make a run comparable: samples where a scene asks for none, and as few pictures as may be, which cost more than a motion.
 pub(crate) fn measured_keys(spec: &SceneSpec) -> Vec<String> {
     let mut keys = Vec::new();
-    match spec.solve.as_ref().map(|s| s.get_ref()) {
-        None | Some(SolveSpec::Static(_)) => {
+    match spec.analysis() {
+        None | Some(SolveSpec::Static(_) | SolveSpec::Stages(_)) => {
             if spec.output.lines.is_empty() && spec.output.probes.is_empty() {
                 keys.extend(lines(spec));
             }
         }
         Some(SolveSpec::Explicit(e)) => {
             if e.output_interval.is_none() {
-                keys.push("solve.explicit.outputs=1".to_owned());
+                keys.push(format!("{}.explicit.outputs=1", spec.analysis_key()));
             }
         }
         Some(SolveSpec::QuasiStatic(_)) => keys.push("solve.quasi-static.outputs=1".to_owned()),

@@ -1,11 +1,12 @@
 //! Settings of a scene that trade speed for accuracy: those of each knob, and the overrides that several of them make together.
 
 use super::generated::{Axis, Generated, generated};
+use bondline::model::Zone;
 use bondline::scene::SceneSpec;
 use bondline::scene::default_points::{RATIO, fraction_of_cells};
 use bondline::scene::spec::{
-    CouplingSpec, CouplingTraits, LatticeStart, MaterialSpec, MeshSpec, PointsSpec, ShapeSpec,
-    SolveSpec, TransitionSpec, TruncatedSpec, ZonesNeeded,
+    CouplingSpec, CouplingTraits, LatticeStart, MaterialSpec, PointsSpec, ShapeSpec, SolveSpec,
+    TransitionSpec, TruncatedSpec, ZonesNeeded,
 };
 
 /// One setting of a knob: how it is called in tables, and what it does.
@@ -76,7 +77,8 @@ pub(crate) struct Base {
     pub can_break: bool,
     pub moves: bool,
     /// It moves in time.
-    explicit: bool,
+    /// The key of the table of its motion, if it is in time.
+    explicit: Option<String>,
 }
 
 /// A zone whose edge can be moved outwards.
@@ -108,7 +110,7 @@ impl Base {
             }
         });
         let breaks = |m: &MaterialSpec| !m.failure().is_empty();
-        let solve = spec.solve.as_ref().map(|s| s.get_ref());
+        let solve = spec.analysis();
         let moves = !matches!(solve, None | Some(SolveSpec::Static(_)));
         let transition = spec.zones.transition.as_ref().map(|t| t.get_ref());
         Self {
@@ -147,7 +149,8 @@ impl Base {
                 || spec.materials.values().any(breaks),
             can_break: spec.materials.values().any(breaks),
             moves,
-            explicit: matches!(solve, Some(SolveSpec::Explicit(_))),
+            explicit: matches!(solve, Some(SolveSpec::Explicit(_)))
+                .then(|| format!("{}.explicit", spec.analysis_key())),
         }
     }
 
@@ -217,16 +220,55 @@ impl Base {
             "padding" if self.nonlocal.is_some() && self.horizon.is_some() => [-1.0, 1.0, 2.0]
                 .map(|f| setting(format!("padding {f:+} horizons"), Change::Padding(f)))
                 .into(),
-            "step-fraction" if self.explicit => vec![setting(
-                "step-fraction = 0.5".to_owned(),
-                Change::Keys(vec!["solve.explicit.step-fraction=0.5".to_owned()]),
-            )],
+            "step-fraction" => (self.explicit.iter())
+                .map(|key| {
+                    let halved = vec![format!("{key}.step-fraction=0.5")];
+                    setting("step-fraction = 0.5".to_owned(), Change::Keys(halved))
+                })
+                .collect(),
             "precision" if self.moves && self.horizon.is_some() => vec![setting(
                 "precision = single".to_owned(),
                 Change::Keys(vec!["peridynamics.precision=single".to_owned()]),
             )],
             _ => Vec::new(),
         }
+    }
+
+    /// Name of the scene's coupling.
+    pub(crate) fn coupling(&self) -> &'static str {
+        self.traits.name
+    }
+
+    /// Returns true if the mesh is that of a file.
+    pub(crate) fn is_from_file(&self) -> bool {
+        self.mesh.is_none()
+    }
+
+    /// Returns true if a change does something in a scene with this coupling: elements alone have no points, and peridynamics everywhere no zone.
+    pub(crate) fn acts(&self, change: &Change, coupling: &str) -> bool {
+        let traits = named(coupling).map_or(self.traits, |coupling| coupling.traits());
+        let has_elements = !matches!(traits.zones, ZonesNeeded::Everywhere(Zone::Nonlocal));
+        let has_points = !matches!(traits.zones, ZonesNeeded::Everywhere(Zone::Local));
+        match change {
+            // points that lie in the cells move these
+            Change::Horizon(_) | Change::Ratio(_) => has_points || self.lattice.is_none(),
+            Change::Padding(_) => has_points && has_elements,
+            Change::Elements(_) => has_elements || self.lattice.is_none(),
+            Change::Keys(keys) => {
+                has_points || !keys.iter().any(|key| key.starts_with("peridynamics."))
+            }
+            Change::Coupling(_) => true,
+        }
+    }
+
+    /// Keys of elements alone: half as large, or those of a file of second order.
+    pub(crate) fn elements_alone(&self) -> Vec<String> {
+        let mut keys = vec!["coupling=local".to_owned()];
+        match self.mesh {
+            Some(_) => self.mesh_overrides(0.5, &mut keys),
+            None => keys.push("mesh.file.order=second".to_owned()),
+        }
+        keys
     }
 
     /// Returns the changes that make a reference: twice as fine in horizon (unless it is a length of the material), points and elements.
@@ -500,25 +542,6 @@ pub(crate) fn coordinates(x: &[f64]) -> String {
             format!("[{}]", list.join(", "))
         }
     }
-}
-
-/// Corners of the cut-outs of a generated mesh.
-pub(crate) fn cutouts(spec: &SceneSpec) -> Vec<(Vec<f64>, Vec<f64>)> {
-    let cutouts = match &spec.mesh {
-        Some(MeshSpec::Line(m)) => &m.cutouts,
-        Some(MeshSpec::Rectangle(m)) => &m.cutouts,
-        Some(MeshSpec::Box(m)) => &m.cutouts,
-        Some(MeshSpec::File(_)) | None => return Vec::new(),
-    };
-    let corners = cutouts.values();
-    corners
-        .map(|c| (c.min.values.clone(), c.max.values.clone()))
-        .collect()
-}
-
-/// Corners of a generated mesh.
-pub(crate) fn corners(spec: &SceneSpec) -> Option<(Vec<f64>, Vec<f64>)> {
-    generated(spec).map(|m| (m.min, m.max))
 }
 
 /// A knob that turns a key of the scene: `solver.tolerance=[1e-4, 1e-8]`.

@@ -27,6 +27,8 @@ pub(super) struct Case {
     pub name: String,
     pub text: String,
     pub mesh: String,
+    /// Place of a sharp root in the plane of x and y, and the distance from it within which no mesh tells a stress.
+    pub root: Option<([f64; 2], f64)>,
 }
 
 /// Wave speed of the material, about.
@@ -69,6 +71,7 @@ fn more() -> Vec<Body> {
             conditions: "left.displacement = { inside.box = { min = [-1, -1], max = [0.01, 21] }, x = 0, y = 0 }
 weight.body-force = { y = '1e-4{f}' }",
             inclusion: None,
+            root: None,
         },
         Body {
             name: "octant of a thick sphere",
@@ -76,6 +79,7 @@ weight.body-force = { y = '1e-4{f}' }",
             conditions: "held.displacement = { on = \"held\", x = 0, y = 0, z = 0 }
 inner.pressure = { on = \"inner\", value = '1e-3{f}' }",
             inclusion: None,
+            root: None,
         },
         Body {
             name: "lug of tetrahedra",
@@ -83,6 +87,7 @@ inner.pressure = { on = \"inner\", value = '1e-3{f}' }",
             conditions: "left.displacement = { inside.box = { min = [-1, -1, -1], max = [11, 11, 0.01] }, x = 0, y = 0, z = 0 }
 weight.body-force = { x = '1e-4{f}', z = '2e-4{f}' }",
             inclusion: None,
+            root: None,
         },
     ];
     // linear cells are too coarse a truth
@@ -143,6 +148,7 @@ fn drawn<const D: usize>(draw: &mut Draw, body: &Body, nodes: &[[f64; 3]], numbe
         name: format!("{}, {}, {typed}, {way}, number {number}", body.name, law.0),
         text: obstacles::text(body, law.1, &more, &factor.replace('T', &time)),
         mesh: body.family.mesh.clone(),
+        root: body.root.map(|root| (root, body.family.size)),
     }
 }
 

@@ -156,7 +156,8 @@ impl Outcome {
 /// Displacement and stress at the places of the lines, by their coordinates; of the last state.
 type Along = BTreeMap<String, ([f64; 3], f64)>;
 
-fn along(tables: Vec<Option<String>>) -> Result<Along, String> {
+/// The last state along the lines, of the places that count.
+fn along(tables: Vec<Option<String>>, counts: impl Fn(&[f64; 3]) -> bool) -> Result<Along, String> {
     let mut found = Along::new();
     for table in tables.into_iter().flatten() {
         let mut lines = table
@@ -171,6 +172,9 @@ fn along(tables: Vec<Option<String>>) -> Result<Along, String> {
                 entry.and_then(|e| e.parse::<f64>().ok())
             };
             let place = ["x", "y", "z"].map(|x| number(x).unwrap_or(0.0));
+            if !counts(&place) {
+                continue;
+            }
             let key = format!("{:.6} {:.6} {:.6}", place[0], place[1], place[2]);
             let u = ["ux", "uy", "uz"].map(|u| number(u).unwrap_or(0.0));
             let stress = number("von_mises").ok_or("a line without stress")?;
@@ -207,9 +211,24 @@ fn error(found: &Along, truth: &Along) -> Error {
 
 impl Case {
     fn run(&self, overrides: &[&str]) -> Result<(RunSummary, Along), String> {
+        self.run_where(overrides, |place| self.is_bounded(place))
+    }
+
+    /// The same with the places that count.
+    fn run_where(
+        &self,
+        overrides: &[&str],
+        counts: impl Fn(&[f64; 3]) -> bool,
+    ) -> Result<(RunSummary, Along), String> {
         let files = &[("m.msh", self.mesh.as_str())];
         let (summary, tables) = scene::outputs(&self.text, overrides, files, &LINES)?;
-        Ok((summary, along(tables)?))
+        Ok((summary, along(tables, counts)?))
+    }
+
+    /// Returns true if a place is farther than a cell from a sharp root.
+    fn is_bounded(&self, place: &[f64; 3]) -> bool {
+        self.root
+            .is_none_or(|(root, near)| (place[0] - root[0]).hypot(place[1] - root[1]) > near)
     }
 
     /// The stress at a place alone.
@@ -217,7 +236,7 @@ impl Case {
         let mut end = place.to_vec();
         end[0] += 1e-9;
         let line = format!("output.lines={{ a={{ from={place:?}, to={end:?}, samples=2 }} }}");
-        let (_, found) = self.run(&[overrides, &[line.as_str()]].concat())?;
+        let (_, found) = self.run_where(&[overrides, &[line.as_str()]].concat(), |_| true)?;
         let stress = found.values().next().map(|(_, stress)| *stress);
         stress.ok_or_else(|| "the place lies outside of the body".to_owned())
     }
@@ -272,7 +291,8 @@ pub(super) fn outcome(case: &Case) -> Result<Outcome, String> {
         run: Run::Done {
             error: own,
             told,
-            there: place.and_then(|place| case.error_at(&place, &[]).ok()),
+            there: (told.place.filter(|place| case.is_bounded(place)).and(place))
+                .and_then(|place| case.error_at(&place, &[]).ok()),
         },
         tried: (summary.warnings.iter())
             .flat_map(|warning| case.tried(warning, own, &truth))

@@ -38,6 +38,8 @@ pub(crate) struct Body {
     pub conditions: &'static str,
     /// Cells of a second material, as they are typed.
     pub inclusion: Option<&'static str>,
+    /// Place in the plane of x and y of a sharp root, at which stresses are not bounded.
+    pub root: Option<[f64; 2]>,
 }
 
 /// Place of the factor of a load.
@@ -81,6 +83,7 @@ pub(crate) fn bodies(effort: Effort) -> Vec<Body> {
 pin.traction = { on = \"loaded\", x = '1e-3{f}', y = '3e-4{f}' }
 weight.body-force = { y = '-1e-4{f}' }",
             inclusion: None,
+            root: None,
         },
         Body {
             name: "quarter ring",
@@ -89,18 +92,21 @@ weight.body-force = { y = '-1e-4{f}' }",
 left.displacement = { on = \"left\", x = 0 }
 bore.pressure = { on = \"bore\", value = '1e-3{f}' }",
             inclusion: None,
+            root: None,
         },
         Body {
             name: "notched plate",
             family: notched_plate(24),
             conditions: PULLED,
             inclusion: None,
+            root: Some([4.0, 12.0]),
         },
         Body {
             name: "two materials",
             family: notched_plate(24),
             conditions: PULLED,
             inclusion: Some("box = { min = [-1, 14.5], max = [25, 25] }"),
+            root: Some([4.0, 12.0]),
         },
     ];
     if effort == Effort::Full {
@@ -111,12 +117,14 @@ bore.pressure = { on = \"bore\", value = '1e-3{f}' }",
 end.traction = { on = \"end\", x = '1e-3{f}', y = '2e-4{f}' }
 weight.body-force = { z = '1e-4{f}' }",
             inclusion: None,
+            root: None,
         });
         list.push(Body {
             name: "notched block",
             family: notched_block(),
             conditions: BENT,
             inclusion: None,
+            root: Some([7.5, 4.0]),
         });
     }
     // linear cells are too coarse a truth where they bend
