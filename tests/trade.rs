@@ -310,7 +310,8 @@ fn hanging_plate(folder: &Path) {
         );
     let more = "[conditions.weight.body-force]\nx = '0.02*y'\n\
                 [output]\nprobes.tip = { at = [0.9, 0.95] }\nlines.cut = { from = [0.1, 0.5], to = [0.9, 0.5], samples = 21 }\n";
-    std::fs::write(folder.join("plate.toml"), scene + more).unwrap();
+    let title = "title = \"A plate that hangs\"\n";
+    std::fs::write(folder.join("plate.toml"), title.to_owned() + &scene + more).unwrap();
     std::fs::write(folder.join("m.msh"), mesh(20)).unwrap();
 }
 

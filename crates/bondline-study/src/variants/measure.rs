@@ -157,7 +157,6 @@ impl Measured {
             probes: probes.to_vec(),
             ..Self::default()
         };
-        let scene = summary["scene"].as_str().unwrap_or_default();
         for reaction in summary["reactions"].as_array().into_iter().flatten() {
             let force = reaction["force"].as_array().into_iter().flatten();
             found.reactions.insert(
@@ -170,8 +169,13 @@ impl Measured {
         }
         let mut paths: Vec<_> = std::fs::read_dir(folder)?
             .filter_map(|e| e.ok().map(|e| e.path()))
-            .filter(|p| p.extension().is_some_and(|e| e == "csv"))
             .collect();
+        // a scene may have a title, and its files another name
+        let mut names = paths.iter().filter_map(|p| p.file_name()?.to_str());
+        let name = names.find_map(|name| name.strip_suffix(RECORD));
+        let scene = name.or(summary["scene"].as_str()).unwrap_or_default();
+        let scene = scene.to_owned();
+        paths.retain(|p| p.extension().is_some_and(|e| e == "csv"));
         paths.sort();
         for path in paths {
             let table = Columns::parse(&std::fs::read_to_string(&path)?);
@@ -182,7 +186,7 @@ impl Measured {
             } else if stem.ends_with("_history") {
                 found.history = Some(table);
             } else {
-                let own = stem.strip_prefix(scene).unwrap_or(&stem);
+                let own = stem.strip_prefix(scene.as_str()).unwrap_or(&stem);
                 let own = own.trim_start_matches('_').to_owned();
                 found.samples.insert(own, table);
             }
@@ -295,6 +299,9 @@ impl Measured {
         sampled(&[(&row(self)?, &row(reference)?)], |n| is_of(n, column))
     }
 }
+
+/// End of the name of the file in which a run records what it was.
+const RECORD: &str = ".run.json";
 
 /// The table of all probes of a scene at rest.
 const PROBES: &str = "probes";
