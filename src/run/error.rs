@@ -103,7 +103,7 @@ pub enum RunError {
         axis: &'static str,
         /// A site that it holds, at rest.
         place: Vec<f64>,
-        /// What it prescribes at time zero.
+        /// Displacement that it prescribes at time zero.
         prescribed: f64,
         /// The displacement of the load steps.
         left: f64,

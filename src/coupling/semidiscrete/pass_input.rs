@@ -116,7 +116,7 @@ impl<const D: usize> PassInput<'_, D> {
         Ok(pass)
     }
 
-    /// What either end gives a bond, the own one first: a bond that acts alone has the mean of both. One behind which no family is, is the same from there.
+    /// Parts that the two ends give a bond, the own one first: a bond that acts alone has the mean of both. One behind which no family is, is the same from there.
     fn ends(&self, i: usize, k: usize) -> [f64; 2] {
         let j = self.families.of(i)[k];
         let own = self.body.coefficients(i, j).0;

@@ -225,7 +225,7 @@ pub struct ReferenceRun {
     pub own_error: OwnError,
 }
 
-/// How the error of a reference itself is known.
+/// Knowledge of the error of a reference itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum OwnError {
     /// From three spacings: those of this case, of the scene as it is, and of the reference, each half of that before.
